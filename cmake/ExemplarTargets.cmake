@@ -1,0 +1,52 @@
+# exemplar_library(NAME SOURCES a.cpp ... [DEPS exemplar::base ...] [PRIVATE_DEPS ...])
+#   A library of services/lib: headers in include/, target exemplar_NAME, alias exemplar::NAME.
+function(exemplar_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(exemplar_${name} STATIC ${ARG_SOURCES})
+    target_include_directories(exemplar_${name} PUBLIC "${CMAKE_CURRENT_SOURCE_DIR}/include"
+                                                PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}/src")
+    target_link_libraries(exemplar_${name} PUBLIC ${ARG_DEPS}
+                                           PRIVATE ${ARG_PRIVATE_DEPS} exemplar_warnings)
+  else()
+    add_library(exemplar_${name} INTERFACE)
+    target_include_directories(exemplar_${name} INTERFACE "${CMAKE_CURRENT_SOURCE_DIR}/include")
+    target_link_libraries(exemplar_${name} INTERFACE ${ARG_DEPS})
+  endif()
+  add_library(exemplar::${name} ALIAS exemplar_${name})
+endfunction()
+
+# exemplar_app(NAME SOURCES ... DEPS ...): the behaviour of a program, as a library without DDS or
+#   gRPC; its headers are included as "NAME/x.hpp" (from services/).
+function(exemplar_app name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  add_library(${name}_app STATIC ${ARG_SOURCES})
+  target_include_directories(${name}_app PUBLIC "${CMAKE_SOURCE_DIR}/services")
+  target_link_libraries(${name}_app PUBLIC ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS} exemplar_warnings)
+endfunction()
+
+# exemplar_program(exemplar-NAME SOURCES main.cpp DEPS ...): a program in build/<preset>/bin.
+function(exemplar_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPS} exemplar_warnings)
+  set_property(GLOBAL APPEND PROPERTY EXEMPLAR_PROGRAMS ${name})
+endfunction()
+
+# exemplar_test(NAME SOURCES ... DEPS ... [LABELS unit] [TIMEOUT seconds]): a GoogleTest binary,
+#   each of its tests known to ctest by name.
+function(exemplar_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 60)
+  endif()
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPS} GTest::gmock GTest::gtest_main exemplar_warnings)
+  target_compile_definitions(${name} PRIVATE
+    EXEMPLAR_SOURCE_DIR="${CMAKE_SOURCE_DIR}" EXEMPLAR_BINARY_DIR="${CMAKE_BINARY_DIR}")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}."
+    DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()

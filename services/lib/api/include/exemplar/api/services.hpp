@@ -1,0 +1,230 @@
+#pragma once
+// What the services offer, in the domain's own values. Each interface has one implementation in the
+// service that does the work and one in rpc/ that calls it over gRPC.
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/demonstration/motion.hpp"
+#include "exemplar/demonstration/trial.hpp"
+#include "exemplar/learning/skill.hpp"
+
+namespace exemplar::api {
+
+// ---------------------------------------------------------------- trials
+
+struct TrialInfo {
+  std::string id;
+  std::string skill;
+  std::string source;
+  Stamp submitted;
+  double duration_s = 0;
+  std::vector<std::string> streams;  ///< "joints (9)", "end effector", "object target", ...
+  std::uint64_t samples = 0;
+  std::vector<std::string> notices;
+};
+
+struct SubmitResult {
+  TrialInfo info;
+  bool duplicate = false;  ///< the same trial was there already; nothing was stored twice
+};
+
+struct TrialSegments {
+  std::string id;
+  std::vector<double> time_s;
+  learning::Segmentation segmentation;
+};
+
+/// Implementations are thread-safe.
+class TrialApi {
+ public:
+  virtual ~TrialApi() = default;
+  /// `file` is a CSV or MCAP file's bytes; `name` its name (for errors, and to tell the format by
+  /// the ending; content decides where the ending does not). Durable when it returns.
+  virtual Result<SubmitResult> Submit(const std::string& skill, const std::string& name,
+                                      std::string file) = 0;
+  virtual Result<std::vector<TrialInfo>> List(
+      const std::string& skill) = 0;  ///< empty: of all skills
+  virtual Result<TrialInfo> Get(const std::string& id) = 0;
+  virtual Result<demonstration::Trial> Load(const std::string& id) = 0;
+  /// Of a stored trial, or of a file that is not stored.
+  virtual Result<TrialSegments> Segments(const std::string& id,
+                                         const std::map<std::string, std::string>& options) = 0;
+  virtual Result<TrialSegments> SegmentsOfFile(
+      const std::string& name, std::string file,
+      const std::map<std::string, std::string>& options) = 0;
+  virtual Result<std::string> ExportCsv(const std::string& id) = 0;
+  virtual Status Delete(const std::string& id) = 0;
+};
+
+// ---------------------------------------------------------------- skills
+
+struct SkillInfo {
+  std::string name;
+  int version = 0;  ///< the current one
+  int versions = 0;
+  std::string method;
+  std::string target;
+  int trials = 0;
+  Stamp learned;
+};
+
+struct VersionInfo {
+  int version = 0;
+  bool current = false;
+  std::string method;
+  std::vector<std::string> trial_ids;
+  Stamp learned;
+};
+
+/// Implementations are thread-safe; Query never waits for Learn.
+class SkillApi {
+ public:
+  virtual ~SkillApi() = default;
+  virtual Result<learning::SkillReport> Learn(const std::string& name,
+                                              const std::map<std::string, std::string>& options,
+                                              const learning::Progress& progress,
+                                              std::stop_token stop) = 0;
+  virtual Result<std::vector<SkillInfo>> List() = 0;
+  /// version 0: the current one.
+  virtual Result<learning::SkillReport> Show(const std::string& name, int version) = 0;
+  virtual Result<std::vector<VersionInfo>> Versions(const std::string& name) = 0;
+  virtual Status Rollback(const std::string& name, int version) = 0;
+  virtual Status Delete(const std::string& name) = 0;
+  virtual Result<demonstration::SkillMotion> Query(const std::string& name, int version,
+                                                   const demonstration::SkillQuery& query) = 0;
+  /// Against a trial file that is not part of the skill.
+  virtual Result<learning::Evaluation> Evaluate(const std::string& name, int version,
+                                                const std::string& file_name, std::string file) = 0;
+  /// The skill as a JSON document (alignment and all): figures are drawn from it.
+  virtual Result<std::string> ExportJson(const std::string& name, int version) = 0;
+};
+
+// ---------------------------------------------------------------- executor
+
+struct ExecuteRequest {
+  std::string skill;
+  int version = 0;
+  std::vector<geometry::NamedPose> objects;  ///< empty: as seen on ircp/objects
+  double speed = 1.0;                        ///< 0 < speed <= 1
+};
+
+struct PlanSummary {
+  double duration_s = 0;
+  int frames = 0;
+  double max_position_error_m = 0;
+  double max_contact_error_m = 0;
+  double clearance_m = 0;
+  std::string clearance_between;  ///< "forearm and table"
+  double time_stretch = 1;
+  std::vector<std::string> warnings;
+};
+
+struct ExecutionFeedback {
+  std::string state;  ///< "planning", "executing", ...
+  double time_s = 0;
+  double duration_s = 0;
+  double tracking_error_rad = 0;
+  double touch_n = 0;
+};
+
+struct ExecutionResult {
+  std::string state;  ///< "done", "aborted", ...
+  std::string detail;
+  PlanSummary plan;
+  double tracking_error_rad = 0;  ///< largest
+  double clearance_m = 0;         ///< smallest of the measured states
+  std::optional<double>
+      contact_error_m;  ///< measured tool to contact point, smallest within the contact window
+  std::optional<double> touch_onset_s;
+  double touch_max_n = 0;
+  std::uint64_t commands_sent = 0;
+  double lateness_p99_s = 0;
+  double lateness_max_s = 0;
+  std::vector<geometry::NamedPose> objects;  ///< poses that were used
+  std::vector<geometry::Pose> base_T_tool;   ///< as measured, with its times, for figures
+  std::vector<double> tool_time_s;
+};
+
+struct SeenObject {
+  geometry::NamedPose pose;
+  double age_s = 0;
+};
+
+struct RobotStatus {
+  std::string state;
+  std::string detail;
+  double speed = 1;
+  std::vector<std::string> joint_names;
+  Eigen::VectorXd joints;  ///< empty when no state was received
+  double state_age_s = 0;
+  geometry::Pose base_T_tool;
+  std::vector<SeenObject> objects;
+};
+
+/// Implementations are thread-safe.
+class ExecutorApi {
+ public:
+  virtual ~ExecutorApi() = default;
+  virtual Result<PlanSummary> Plan(const ExecuteRequest& request) = 0;
+  /// Returns at the end of the motion. Feedback comes about ten times a second.
+  virtual Result<ExecutionResult> Execute(
+      const ExecuteRequest& request, const std::function<void(const ExecutionFeedback&)>& feedback,
+      std::stop_token stop) = 0;
+  virtual Result<RobotStatus> GetStatus() = 0;
+  virtual Status Pause() = 0;
+  virtual Status Resume() = 0;
+  virtual Status Cancel() = 0;
+  virtual Status Stop() = 0;
+  virtual Status Reset() = 0;
+  virtual Status SetSpeed(double factor) = 0;
+};
+
+// ---------------------------------------------------------------- recorder
+
+struct RecordStart {
+  std::string name;  ///< of the file, without ending; empty: made from the time
+  std::map<std::string, std::string> metadata;
+  std::vector<std::string> expected_topics;  ///< wait until these have a writer; may be empty
+  double timeout_s = 5;
+};
+
+struct TopicFigures {
+  std::string topic;
+  std::string type;
+  std::uint64_t sent = 0;  ///< as the writers announced; received + lost where none did
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;
+  double rate_hz = 0;
+  bool has_schema = false;
+  int writers = 0;
+};
+
+struct RecorderStatus {
+  std::string state;  ///< closed, ready, recording, paused, stopped
+  std::string detail;
+  std::string file;  ///< the present or last one, absolute
+  double duration_s = 0;
+  std::uint64_t messages = 0;
+  std::uint64_t bytes = 0;
+  std::vector<TopicFigures> topics;  ///< since the recorder started
+};
+
+/// Implementations are thread-safe.
+class RecorderApi {
+ public:
+  virtual ~RecorderApi() = default;
+  virtual Result<RecorderStatus> Start(const RecordStart& request) = 0;
+  virtual Result<RecorderStatus> Stop() = 0;
+  virtual Result<RecorderStatus> Pause() = 0;
+  virtual Result<RecorderStatus> Resume() = 0;
+  virtual Result<RecorderStatus> GetStatus() = 0;
+};
+
+}  // namespace exemplar::api

@@ -1,0 +1,63 @@
+#pragma once
+// A serial chain of a robot: forward kinematics and Jacobians.
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/demonstration/tool_kinematics.hpp"
+#include "exemplar/kinematics/robot_model.hpp"
+
+namespace exemplar::kinematics {
+
+/// The movable joints between two links. Immutable, so thread-safe.
+class Chain final : public demonstration::ToolKinematics {
+ public:
+  /// `base` empty: the root link. `tip` empty: the link "tool" if there is one, else the only leaf.
+  /// Errors name the link and offer the nearest name.
+  static Result<Chain> Create(const RobotModel& model, std::string_view base, std::string_view tip);
+
+  int dof() const { return static_cast<int>(names_.size()); }
+  const std::vector<std::string>& joint_names() const override { return names_; }
+  const std::vector<JointLimits>& limits() const { return limits_; }
+  const std::string& base_link() const { return base_link_; }
+  const std::string& tip_link() const { return tip_link_; }
+  /// Indices into RobotModel::joints, base to tip.
+  const std::vector<int>& joint_indices() const { return joint_indices_; }
+
+  /// base_T_tip at q (n = dof()).
+  geometry::Pose ToolPose(const Eigen::Ref<const Eigen::VectorXd>& q) const override;
+  /// base_T_tip and the geometric Jacobian (6 x n): rows 0-2 linear velocity of the tip's origin,
+  /// 3-5 angular velocity, both in the base frame. Does not allocate.
+  geometry::Pose ToolPoseAndJacobian(
+      const Eigen::Ref<const Eigen::VectorXd>& q,
+      Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> jacobian) const;
+
+ private:
+  struct Step {
+    geometry::Pose before;  ///< fixed transform from the previous joint's child frame
+    Eigen::Vector3d axis;
+    bool prismatic = false;
+    int variable = 0;  ///< index into q: mimic joints share their leader's
+    double multiplier = 1;
+    double offset = 0;
+  };
+  Chain() = default;
+
+  std::vector<std::string> names_;
+  std::vector<JointLimits> limits_;
+  std::vector<int> joint_indices_;
+  std::vector<Step> steps_;
+  geometry::Pose last_T_tip_;
+  std::string base_link_, tip_link_;
+};
+
+/// base_T_link of every link of the model, in the order of model.links. `q` by joint index of the
+/// model (fixed joints' values are ignored; mimic joints' values are derived).
+void LinkPoses(const RobotModel& model, const Eigen::Ref<const Eigen::VectorXd>& q,
+               std::vector<geometry::Pose>& base_T_links);
+
+}  // namespace exemplar::kinematics

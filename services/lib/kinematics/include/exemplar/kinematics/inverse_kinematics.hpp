@@ -1,0 +1,39 @@
+#pragma once
+// Pose inverse kinematics: one pose, one answer within limits.
+
+#include <Eigen/Core>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/base/rng.hpp"
+#include "exemplar/kinematics/chain.hpp"
+
+namespace exemplar::kinematics {
+
+struct IkOptions {
+  double position_tolerance_m = 1e-5;
+  double rotation_tolerance_rad = 1e-5;
+  bool use_rotation = true;  ///< false: position only
+  /// Pull towards this posture within the null space; empty: none.
+  Eigen::VectorXd preferred = {};
+  double preferred_weight = 1e-3;
+  int max_iterations = 100;  ///< of one descent
+  int max_restarts = 20;     ///< from random postures, after the seed
+  std::uint64_t random_seed = 1;
+};
+
+struct IkSolution {
+  Eigen::VectorXd q;
+  double position_error_m = 0;
+  double rotation_error_rad = 0;
+  int iterations = 0;
+  int restarts = 0;
+};
+
+/// A bounded Levenberg-Marquardt descent with restarts: limits are active bounds, never clamped
+/// afterwards. Deterministic for a seed. kFailedPrecondition with the best errors reached when the
+/// pose is not met. Precondition: seed.size() == chain.dof().
+Result<IkSolution> SolveIk(const Chain& chain, const geometry::Pose& base_T_tool,
+                           const Eigen::Ref<const Eigen::VectorXd>& seed,
+                           const IkOptions& options = {});
+
+}  // namespace exemplar::kinematics

@@ -1,0 +1,49 @@
+#pragma once
+// A robot's folder (deploy/models/<robot>): robot.yaml beside its URDF, which says what a URDF
+// cannot.
+//
+//   urdf: arm7.urdf
+//   base: base            # link in whose frame all poses are
+//   tip: tool             # the frame that skills move
+//   touch_links: [finger] # links that may touch what a skill is about
+//   home: {joint1: 0.0, ...}                    # rad or m; every chain joint
+//   acceleration: {default: 5.0, joint1: 3.0}   # rad/s^2
+//   servo: {default: {stiffness: 400, damping: 40}, joint1: {...}}   # for the simulator
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/kinematics/chain.hpp"
+#include "exemplar/kinematics/robot_model.hpp"
+
+namespace exemplar::kinematics {
+
+struct ServoGains {
+  double stiffness = 400;  ///< N m / rad
+  double damping = 40;     ///< N m s / rad
+};
+
+struct RobotDescription {
+  std::string name;
+  std::filesystem::path folder;
+  RobotModel model;
+  Chain chain;  ///< base to tip
+  std::vector<std::string>
+      touch_links;                ///< empty in the file: the tip link's nearest link with geometry
+  Eigen::VectorXd home;           ///< n = chain.dof()
+  std::vector<ServoGains> servo;  ///< one a chain joint
+};
+
+/// Errors name file, line and key.
+Result<RobotDescription> ReadRobotDescription(const std::filesystem::path& folder);
+
+/// The model's full joint vector (as LinkPoses takes it) with the chain's joints at `q`, others at
+/// 0 or the limit nearest to 0.
+Eigen::VectorXd FullJointVector(const RobotModel& model, const Chain& chain,
+                                const Eigen::Ref<const Eigen::VectorXd>& q);
+
+}  // namespace exemplar::kinematics

@@ -1,0 +1,81 @@
+#pragma once
+// A skill's motion and a scene in, a checked and timed joint trajectory out.
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/collision/scene.hpp"
+#include "exemplar/demonstration/motion.hpp"
+#include "exemplar/kinematics/chain.hpp"
+
+namespace exemplar::motion {
+
+/// Joint positions over time. Invariant: time starts at 0 and increases strictly.
+struct JointTrajectory {
+  std::vector<std::string> joint_names;
+  std::vector<double> time_s;
+  Eigen::MatrixXd positions;   ///< frames x joints
+  Eigen::MatrixXd velocities;  ///< frames x joints
+
+  double duration_s() const { return time_s.empty() ? 0.0 : time_s.back(); }
+};
+
+/// Position and velocity at `time_s` (held before the first and after the last frame), cubic
+/// between frames. Does not allocate. `position` and `velocity` have the trajectory's number of
+/// joints.
+void Evaluate(const JointTrajectory& trajectory, double time_s,
+              Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity);
+
+struct PlanOptions {
+  double position_tolerance_m = 1e-4;  ///< in contact; elsewhere `free_tolerance_m`
+  double free_tolerance_m = 5e-3;
+  double rotation_tolerance_rad = 2e-2;
+  double required_clearance_m = 2e-3;
+  double speed_scale = 1.0;  ///< 1: the demonstrated timing where limits allow
+  double approach_velocity =
+      0.5;                 ///< fraction of joint velocity limits on the way to the first frame
+  std::string touch_link;  ///< link that may touch the target in a contact; empty: the tip link
+};
+
+/// Figures of a plan, for people and for the demo's last line.
+struct PlanReport {
+  double max_position_error_m = 0;  ///< path against the skill's motion, outside contact
+  double max_contact_error_m = 0;   ///< in contact
+  double max_rotation_error_rad = 0;
+  collision::Clearance smallest_clearance;
+  double smallest_clearance_time_s = 0;
+  double time_stretch = 1;  ///< how much slower than demonstrated, 1: as demonstrated
+  double approach_s = 0;    ///< time from the start state to the motion's first frame
+  std::vector<std::string> warnings;
+};
+
+/// Intervals of the trajectory in which the tool is in contact.
+struct ContactWindow {
+  std::string object;
+  double begin_s = 0;
+  double end_s = 0;
+  Eigen::Vector3d base_p_contact = Eigen::Vector3d::Zero();
+};
+
+struct PlannedMotion {
+  JointTrajectory trajectory;
+  std::vector<ContactWindow> contacts;
+  PlanReport report;
+};
+
+/// IK along the whole motion, collision checks at and between frames, timing within limits.
+/// `start` (chain.dof() values): where the robot is. Refusals are kFailedPrecondition and say when,
+/// which links, how deep, or which frame is out of reach and by how much.
+Result<PlannedMotion> PlanMotion(const demonstration::SkillMotion& motion,
+                                 const kinematics::RobotModel& model,
+                                 const kinematics::Chain& chain,
+                                 const collision::CollisionChecker& checker,
+                                 const Eigen::Ref<const Eigen::VectorXd>& start,
+                                 const PlanOptions& options = {}, std::stop_token stop = {});
+
+}  // namespace exemplar::motion

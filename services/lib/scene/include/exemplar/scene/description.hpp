@@ -1,0 +1,86 @@
+#pragma once
+// What stands around the robot, as one YAML file that executor, simulator, vision and the simulated
+// person share. Metres, radians, newtons; poses in the robot's base frame; quaternions x, y, z, w.
+//
+//   obstacles:
+//     - {name: table, shape: box, size: [1.2, 0.8, 0.04], position: [0.7, 0, -0.02], quaternion:
+//     [0, 0, 0, 1]}
+//   buttons:
+//     - name: target            # its frame's origin is where hand and button meet unless `contact`
+//     says otherwise
+//       position: [0.6, -0.2, 0.05]
+//       quaternion: [0, 0, 0, 1]
+//       contact: [0, 0, 0]      # centre of the cap's upper face, in the button's frame
+//       normal: [0, 0, 1]       # outward, in the button's frame
+//       radius: 0.02
+//       height: 0.04            # of the housing below the cap
+//       travel: 0.004
+//       click_force: 3
+//       marker: {id: 7, size: 0.04, position: [0.05, 0, -0.02], quaternion: [0, 0, 0, 1]}
+//   cameras:
+//     - {name: stereo, position: [0.6, 0, 1.2], look_at: [0.6, 0, 0], up: [1, 0, 0], baseline: 0.1,
+//        width: 640, height: 480, fovy_deg: 50, rate_hz: 10}
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/geometry/pose.hpp"
+#include "exemplar/kinematics/robot_model.hpp"
+
+namespace exemplar::scene {
+
+struct Obstacle {
+  std::string name;
+  geometry::Pose base_T_shape;
+  kinematics::Shape shape;
+};
+
+/// A square ArUco marker (dictionary 4x4, 50 ids) fixed to an object; z out of the printed face.
+struct Marker {
+  int id = 0;
+  double size_m = 0.04;  ///< edge of the black square
+  geometry::Pose object_T_marker;
+};
+
+struct Button {
+  std::string name;
+  geometry::Pose base_T_object;
+  Eigen::Vector3d object_p_contact = Eigen::Vector3d::Zero();
+  Eigen::Vector3d object_normal = Eigen::Vector3d::UnitZ();
+  double radius_m = 0.02;
+  double height_m = 0.04;
+  double travel_m = 0.004;
+  double click_force_n = 3;
+  std::optional<Marker> marker;
+};
+
+/// A rectified stereo pair: the right camera is `baseline_m` along the left camera's +x.
+struct StereoCamera {
+  std::string name;
+  geometry::Pose base_T_left;  ///< optical frame: z forward, x right, y down
+  double baseline_m = 0.1;
+  int width = 640;
+  int height = 480;
+  double fovy_rad = 0.87;
+  double rate_hz = 10;
+
+  /// Focal length in pixels, both axes.
+  double focal_px() const;
+};
+
+struct Description {
+  std::vector<Obstacle> obstacles;
+  std::vector<Button> buttons;
+  std::vector<StereoCamera> cameras;
+};
+
+/// Errors name file, line and key; unknown keys are errors with the nearest known one.
+Result<Description> ReadDescription(const std::filesystem::path& file);
+Result<Description> ParseDescription(std::string_view yaml, std::string_view source);
+
+}  // namespace exemplar::scene
