@@ -1,0 +1,68 @@
+#pragma once
+// Serves the interfaces of api/services.hpp over gRPC. gRPC itself stays behind this header.
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "exemplar/api/services.hpp"
+#include "exemplar/base/result.hpp"
+#include "exemplar/base/stamp.hpp"
+
+namespace exemplar::rpc {
+
+/// What a server serves: any subset. The objects must outlive the server.
+struct Services {
+  api::TrialApi* trials = nullptr;
+  api::SkillApi* skills = nullptr;
+  api::ExecutorApi* executor = nullptr;
+  api::RecorderApi* recorder = nullptr;
+};
+
+/// One finished call, for logs and metrics.
+struct CallRecord {
+  std::string_view method;      ///< "exemplar.v1.SkillService/Query"
+  std::string_view request_id;  ///< the caller's `x-request-id`, else one made here
+  std::string_view peer;        ///< "ipv4:127.0.0.1:40312"
+  Status status;
+  Duration duration{0};
+};
+
+struct ServerOptions {
+  /// HOST:PORT; port 0 picks a free one.
+  std::string listen = "127.0.0.1:0";
+  /// Gets the port as decimal text, written whole or not at all, once the server answers. Empty:
+  /// none.
+  std::filesystem::path port_file = {};
+  /// Larger requests are refused with RESOURCE_EXHAUSTED; files travel in chunks far below it.
+  std::size_t max_message_bytes = std::size_t{64} << 20;
+  /// Larger files are refused while they are sent.
+  std::size_t max_file_bytes = std::size_t{1} << 30;
+  /// Called at the end of each call, from the call's thread: must be thread-safe and quick.
+  std::function<void(const CallRecord&)> on_call = {};
+};
+
+/// A running gRPC server with the health service (status of "" and of each service by its full
+/// name) and reflection. A caller who goes away, cancels or runs out of time requests the stop of
+/// the stop_token that the interface's method got. Thread-safe.
+class Server {
+ public:
+  /// Listens when it returns. Errors name the address or the port file.
+  static Result<std::unique_ptr<Server>> Create(const ServerOptions& options, Services services);
+  /// As Shutdown(1 s).
+  virtual ~Server() = default;
+
+  virtual int port() const = 0;
+  /// "127.0.0.1:40001": as listened on, with the real port.
+  virtual const std::string& address() const = 0;
+  /// The health service answers NOT_SERVING from here on (or SERVING again).
+  virtual void SetServing(bool serving) = 0;
+  /// Refuses new calls, requests the stop of those that run, waits up to `grace` and then cuts the
+  /// rest off. Returns when no call runs any more. May be called repeatedly.
+  virtual void Shutdown(Duration grace) = 0;
+};
+
+}  // namespace exemplar::rpc
