@@ -1,0 +1,150 @@
+#include "exemplar/program/options.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <utility>
+
+#include "exemplar/program/runtime.hpp"
+
+namespace exemplar::program {
+namespace {
+
+/// Lets CLI11 read YAML: a map of option names to scalars or lists of scalars.
+class YamlConfig final : public CLI::Config {
+ public:
+  std::string to_config(const CLI::App*, bool, bool, std::string) const override { return {}; }
+
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+    YAML::Node root;
+    try {
+      root = YAML::Load(input);
+    } catch (const YAML::Exception& e) {
+      throw CLI::ConfigError("line " + std::to_string(e.mark.line + 1) + ": " + e.msg);
+    }
+    std::vector<CLI::ConfigItem> entries;
+    if (root.IsNull()) return entries;
+    if (!root.IsMap()) throw CLI::ConfigError("the file must hold a map of option names to values");
+    for (const auto& entry : root) {
+      CLI::ConfigItem item;
+      item.name = entry.first.as<std::string>();
+      const int line = entry.first.Mark().line + 1;
+      if (entry.second.IsScalar()) {
+        item.inputs = {entry.second.Scalar()};
+      } else if (entry.second.IsSequence()) {
+        for (const YAML::Node& part : entry.second) {
+          if (!part.IsScalar()) Refuse(line, item.name);
+          item.inputs.push_back(part.Scalar());
+        }
+      } else {
+        Refuse(line, item.name);
+      }
+      entries.push_back(std::move(item));
+    }
+    return entries;
+  }
+
+ private:
+  [[noreturn]] static void Refuse(int line, const std::string& name) {
+    throw CLI::ConfigError("line " + std::to_string(line) + ": " + name +
+                           " must be a value or a list of values");
+  }
+};
+
+}  // namespace
+
+struct Options::Impl {
+  Impl(const std::string& name, std::string summary, std::string footer)
+      : program(name), app(std::move(summary), name) {
+    app.footer(std::move(footer));
+    app.get_formatter()->column_width(34);
+    app.option_defaults()->always_capture_default();
+  }
+
+  std::string program;
+  CommonOptions common;
+  CLI::App app;
+  CLI::Option* last = nullptr;
+};
+
+Options::Options(std::string program, std::string summary, std::string footer, Roles roles)
+    : impl_(std::make_unique<Impl>(program, std::move(summary), std::move(footer))) {
+  CLI::App& app = impl_->app;
+  CommonOptions& common = impl_->common;
+  app.config_formatter(std::make_shared<YamlConfig>());
+  app.set_config("--config", "", "YAML file with any of these options; flags override it");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  app.set_version_flag("--version", std::string(Version()));
+  if (roles.bus) {
+    app.add_option("--domain", common.domain, "DDS domain")->check(CLI::Range(0, 232));
+    app.add_option("--station", common.station, "name of the place; stations never mix");
+  }
+  if (roles.server) {
+    app.add_option("--listen", common.listen, "HOST:PORT of the gRPC server; port 0 picks one");
+    app.add_option("--port-file", common.port_file, "file that gets the port in use");
+  }
+  if (roles.data)
+    app.add_option("--data-dir", common.data_dir, "folder for what is stored")->required();
+  app.add_option("--metrics", common.metrics, "HOST:PORT of the Prometheus endpoint; empty: none");
+  app.add_option("--log-format", common.log_format, "how events are written to stderr")
+      ->check(CLI::IsMember({"text", "json"}));
+  app.add_option("--log-level", common.log_level, "least level that is written")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error"}));
+}
+
+Options::~Options() = default;
+
+Options& Options::Add(const std::string& name, std::string& value, const std::string& help) {
+  impl_->last = impl_->app.add_option(name, value, help);
+  return *this;
+}
+Options& Options::Add(const std::string& name, double& value, const std::string& help) {
+  impl_->last = impl_->app.add_option(name, value, help);
+  return *this;
+}
+Options& Options::Add(const std::string& name, int& value, const std::string& help) {
+  impl_->last = impl_->app.add_option(name, value, help);
+  return *this;
+}
+Options& Options::Add(const std::string& name, bool& value, const std::string& help) {
+  impl_->last = impl_->app.add_flag(name, value, help);
+  return *this;
+}
+Options& Options::Add(const std::string& name, std::vector<std::string>& values,
+                      const std::string& help) {
+  impl_->last = impl_->app.add_option(name, values, help);
+  return *this;
+}
+Options& Options::Required() {
+  impl_->last->required();
+  return *this;
+}
+Options& Options::OneOf(const std::vector<std::string>& choices) {
+  impl_->last->check(CLI::IsMember(choices));
+  return *this;
+}
+Options& Options::MinMax(double least, double greatest) {
+  impl_->last->check(CLI::Range(least, greatest));
+  return *this;
+}
+
+CommonOptions& Options::common() { return impl_->common; }
+
+std::optional<int> Options::Parse(int argc, char** argv) {
+  try {
+    impl_->app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::cout << impl_->app.help();
+    return 0;
+  } catch (const CLI::CallForVersion&) {
+    std::cout << impl_->program << ' ' << Version() << '\n';
+    return 0;
+  } catch (const CLI::ParseError& e) {
+    std::cerr << impl_->program << ": " << e.what() << "\nTry '" << impl_->program << " --help'.\n";
+    return 2;
+  }
+  return std::nullopt;
+}
+
+}  // namespace exemplar::program
