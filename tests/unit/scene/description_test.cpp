@@ -1,0 +1,149 @@
+#include "exemplar/scene/description.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+namespace exemplar::scene {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char* kScene = R"(obstacles:
+  - {name: table, shape: box, size: [1.2, 0.8, 0.04], position: [0.7, 0, -0.02]}
+  - {name: lamp, shape: capsule, radius: 0.03, length: 0.2, position: [0.2, 0.5, 0.4],
+     quaternion: [0, 0.7071, 0, 0.7071]}
+buttons:
+  - name: target
+    position: [0.6, -0.2, 0.05]
+    contact: [0, 0, 0.01]
+    normal: [0, 0, 2]
+    radius: 0.015
+    marker: {id: 7, size: 0.05, position: [0.05, 0, -0.02]}
+cameras:
+  - {name: stereo, position: [0.6, 0, 1.2], look_at: [0.6, 0, 0], up: [1, 0, 0], fovy_deg: 60}
+)";
+
+std::string ErrorOf(std::string_view yaml) {
+  const Result<Description> read = ParseDescription(yaml, "scene.yaml");
+  return read.ok() ? "no error" : read.error().message;
+}
+
+TEST(Description, ReadsObstaclesButtonsAndCameras) {
+  const Result<Description> read = ParseDescription(kScene, "scene.yaml");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->obstacles.size(), 2u);
+  EXPECT_EQ(std::get<kinematics::Box>(read->obstacles[0].shape).size,
+            Eigen::Vector3d(1.2, 0.8, 0.04));
+  EXPECT_EQ(std::get<kinematics::Capsule>(read->obstacles[1].shape).length, 0.2);
+  EXPECT_NEAR(read->obstacles[1].base_T_shape.rotation.norm(), 1, 1e-15);
+  ASSERT_EQ(read->buttons.size(), 1u);
+  const Button& button = read->buttons[0];
+  EXPECT_EQ(button.name, "target");
+  EXPECT_EQ(button.base_T_object.translation, Eigen::Vector3d(0.6, -0.2, 0.05));
+  EXPECT_EQ(button.object_p_contact, Eigen::Vector3d(0, 0, 0.01));
+  EXPECT_EQ(button.object_normal, Eigen::Vector3d::UnitZ());
+  EXPECT_EQ(button.radius_m, 0.015);
+  EXPECT_EQ(button.travel_m, 0.004);
+  ASSERT_TRUE(button.marker.has_value());
+  EXPECT_EQ(button.marker->id, 7);
+  EXPECT_EQ(button.marker->object_T_marker.translation, Eigen::Vector3d(0.05, 0, -0.02));
+  ASSERT_EQ(read->cameras.size(), 1u);
+  EXPECT_NEAR(read->cameras[0].fovy_rad, std::numbers::pi / 3, 1e-15);
+}
+
+TEST(Description, LookingDownPutsTheOpticalAxesAsAPhotographerWould) {
+  const Result<Description> read = ParseDescription(kScene, "scene.yaml");
+  ASSERT_TRUE(read.ok());
+  const Eigen::Matrix3d base_R_left = read->cameras[0].base_T_left.rotation.toRotationMatrix();
+  EXPECT_TRUE(base_R_left.col(2).isApprox(-Eigen::Vector3d::UnitZ(), 1e-12)) << base_R_left;
+  EXPECT_TRUE(base_R_left.col(1).isApprox(-Eigen::Vector3d::UnitX(), 1e-12)) << base_R_left;
+  EXPECT_TRUE(base_R_left.col(0).isApprox(-Eigen::Vector3d::UnitY(), 1e-12)) << base_R_left;
+}
+
+TEST(Description, FocalLengthMapsTheFieldOfViewOntoThePicturesHeight) {
+  StereoCamera camera;
+  camera.height = 480;
+  camera.fovy_rad = std::numbers::pi / 2;
+  EXPECT_NEAR(camera.focal_px(), 240, 1e-9);
+}
+
+TEST(Description, AnEmptyFileIsAnEmptyScene) {
+  const Result<Description> read = ParseDescription("# nothing yet\n", "scene.yaml");
+  ASSERT_TRUE(read.ok());
+  EXPECT_TRUE(read->obstacles.empty() && read->buttons.empty() && read->cameras.empty());
+}
+
+TEST(Description, AnUnknownKeyIsAnErrorWithTheNearestName) {
+  EXPECT_THAT(
+      ErrorOf("buttons:\n  - name: a\n    positon: [0, 0, 0]\n"),
+      AllOf(HasSubstr("scene.yaml:3"), HasSubstr("buttons[0].positon"), HasSubstr("\"position\"")));
+}
+
+TEST(Description, ErrorsNameFileLineAndKey) {
+  EXPECT_THAT(ErrorOf("buttons:\n  - name: a\n    position: [0, 0, 0]\n    radius: -0.02\n"),
+              AllOf(HasSubstr("scene.yaml:4"), HasSubstr("buttons[0].radius"),
+                    HasSubstr("-0.02 must be positive")));
+  EXPECT_THAT(ErrorOf("obstacles:\n  - {name: a, shape: box, position: [0, nan, 0]}\n"),
+              AllOf(HasSubstr("scene.yaml:2"), HasSubstr("obstacles[0].position[1]"),
+                    HasSubstr("not finite")));
+  EXPECT_THAT(ErrorOf("obstacles:\n  - {name: a, shape: box, position: [0, 0]}\n"),
+              HasSubstr("list of 3 numbers"));
+  EXPECT_THAT(ErrorOf("obstacles:\n  - {name: a, shape: box, position: [0, 0, 0]}\n"),
+              AllOf(HasSubstr("obstacles[0].size"), HasSubstr("missing")));
+  EXPECT_THAT(ErrorOf("cameras: 5\n"), AllOf(HasSubstr("cameras"), HasSubstr("must be a list")));
+  EXPECT_THAT(ErrorOf("buttons: [1]\n"), HasSubstr("buttons[0]"));
+  EXPECT_THAT(ErrorOf("buttons: [\n"), HasSubstr("scene.yaml:"));
+}
+
+TEST(Description, RefusesWhatCannotBe) {
+  const std::string button = "buttons:\n  - name: a\n    position: [0, 0, 0]\n";
+  EXPECT_THAT(ErrorOf(button + "    quaternion: [0, 0, 0, 0]\n"), HasSubstr("norm 0.0000"));
+  EXPECT_THAT(ErrorOf(button + "    normal: [0, 0, 0]\n"), HasSubstr("zero vector"));
+  EXPECT_THAT(ErrorOf(button + "    travel: 0.05\n"), HasSubstr("less than"));
+  EXPECT_THAT(ErrorOf(button + "    marker: {id: 50, position: [0, 0, 0]}\n"),
+              AllOf(HasSubstr("buttons[0].marker.id"), HasSubstr("from 0 to 49")));
+  EXPECT_THAT(ErrorOf(button + "  - name: a\n    position: [1, 0, 0]\n"), HasSubstr("taken"));
+  EXPECT_THAT(ErrorOf(button + "    name: b\n"), HasSubstr("twice"));
+  EXPECT_THAT(ErrorOf("obstacles:\n  - {name: a, shape: ball, position: [0, 0, 0]}\n"),
+              HasSubstr("\"ball\" is none of"));
+  EXPECT_THAT(ErrorOf("obstacles:\n  - {name: a, shape: sphere, radius: 1, length: 2, position: "
+                      "[0, 0, 0]}\n"),
+              HasSubstr("does not belong to a sphere"));
+  EXPECT_THAT(ErrorOf("cameras:\n  - {name: c, position: [0, 0, 1], look_at: [0, 0, 0]}\n"),
+              HasSubstr("up"));
+}
+
+TEST(Description, TwoButtonsCannotShareAMarker) {
+  EXPECT_THAT(ErrorOf("buttons:\n"
+                      "  - {name: a, position: [0, 0, 0], marker: {id: 3, position: [0, 0, 0]}}\n"
+                      "  - {name: b, position: [1, 0, 0], marker: {id: 3, position: [0, 0, 0]}}\n"),
+              AllOf(HasSubstr("marker id 3"), HasSubstr("\"b\"")));
+}
+
+TEST(Description, MeshPathsStartAtTheFile) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / "exemplar_scene_test";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "scene.yaml")
+      << "obstacles:\n  - {name: a, shape: mesh, mesh: meshes/a.stl, position: [0, 0, 0]}\n";
+  const Result<Description> read = ReadDescription(folder / "scene.yaml");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(std::get<kinematics::Mesh>(read->obstacles[0].shape).path,
+            (folder / "meshes/a.stl").string());
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Description, AMissingFileIsNotFound) {
+  const Result<Description> read = ReadDescription("/nowhere/scene.yaml");
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(read.error().message, HasSubstr("/nowhere/scene.yaml"));
+}
+
+}  // namespace
+}  // namespace exemplar::scene
