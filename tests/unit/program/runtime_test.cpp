@@ -1,0 +1,88 @@
+#include "exemplar/program/runtime.hpp"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+namespace exemplar::program {
+namespace {
+
+std::string Get(int port, const std::string& path) {
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  const std::string request = "GET " + path + " HTTP/1.0\r\n\r\n";
+  EXPECT_EQ(send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+  std::string answer;
+  char buffer[4096];
+  for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) {
+    answer.append(buffer, static_cast<std::size_t>(n));
+  }
+  close(fd);
+  return answer;
+}
+
+TEST(MetricsServerTest, ServesWhatItsMetricsSayNow) {
+  double messages = 3;
+  std::vector<Metric> metrics{
+      {.name = "exemplar_messages_total",
+       .help = "messages written",
+       .counter = true,
+       .values = [&] {
+         return std::vector<Metric::Value>{{{{"topic", "ircp/suit"}}, messages}};
+       }}};
+  const auto server = MetricsServer::Create("127.0.0.1:0", metrics);
+  ASSERT_TRUE(server.ok());
+  messages = 5;
+  EXPECT_THAT(Get((*server)->port(), "/metrics"),
+              testing::HasSubstr("exemplar_messages_total{topic=\"ircp/suit\"} 5"));
+  EXPECT_THAT(Get((*server)->port(), "/healthz"), testing::HasSubstr("200 OK"));
+  EXPECT_THAT(Get((*server)->port(), "/secret"), testing::HasSubstr("404"));
+}
+
+TEST(MetricsServerTest, RefusesAnAddressThatIsNone) {
+  const auto server = MetricsServer::Create("nowhere", {});
+  ASSERT_FALSE(server.ok());
+  EXPECT_THAT(server.error().message, testing::HasSubstr("\"nowhere\" is not HOST:PORT"));
+}
+
+TEST(LogTest, WritesOneJsonObjectALine) {
+  CommonOptions options;
+  options.log_format = "json";
+  testing::internal::CaptureStderr();
+  MakeLog(options, "recorder")->Info("recording", {{"file", "a \"b\".mcap"}, {"messages", 12}});
+  const nlohmann::json line = nlohmann::json::parse(testing::internal::GetCapturedStderr());
+  EXPECT_EQ(line["event"], "recording");
+  EXPECT_EQ(line["file"], "a \"b\".mcap");
+  EXPECT_EQ(line["messages"], "12");
+  EXPECT_EQ(line["level"], "info");
+}
+
+TEST(LogTest, LeavesOutWhatIsBelowItsLevel) {
+  CommonOptions options;
+  options.log_level = "warning";
+  testing::internal::CaptureStderr();
+  const auto log = MakeLog(options, "recorder");
+  log->Info("nothing special");
+  log->Warning("disk nearly full", {{"free", "1 GB"}});
+  const std::string lines = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(lines, testing::Not(testing::HasSubstr("nothing special")));
+  EXPECT_THAT(lines, testing::HasSubstr("warning recorder: disk nearly full free=\"1 GB\""));
+}
+
+TEST(ExitCodeTest, FollowsTheContract) {
+  EXPECT_EQ(ExitCode(ErrorCode::kNotFound), 3);
+  EXPECT_EQ(ExitCode(ErrorCode::kFailedPrecondition), 4);
+  EXPECT_EQ(ExitCode(ErrorCode::kUnavailable), 5);
+  EXPECT_EQ(ExitCode(ErrorCode::kInternal), 1);
+}
+
+}  // namespace
+}  // namespace exemplar::program
