@@ -112,6 +112,8 @@ struct ExecuteRequest {
   std::string skill;
   int version = 0;
   std::vector<geometry::NamedPose> objects;  ///< empty: as seen on ircp/objects
+  /// Where the motion is to begin; the robot goes there first. Absent: where the tool is now.
+  std::optional<geometry::Pose> start;
   double speed = 1.0;                        ///< 0 < speed <= 1
 };
 
