@@ -13,7 +13,9 @@
 
 namespace exemplar::kinematics {
 
-/// The movable joints between two links. Immutable, so thread-safe.
+/// The movable joints between two links of a tree, up from `base` and down to `tip` where neither
+/// is above the other. A mimic joint moves with its leader, which is a joint of the chain even if
+/// it lies elsewhere. Immutable, so thread-safe.
 class Chain final : public demonstration::ToolKinematics {
  public:
   /// `base` empty: the root link. `tip` empty: the link "tool" if there is one, else the only leaf.
@@ -37,27 +39,32 @@ class Chain final : public demonstration::ToolKinematics {
       Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> jacobian) const;
 
  private:
+  class Builder;
   struct Step {
-    geometry::Pose before;  ///< fixed transform from the previous joint's child frame
-    Eigen::Vector3d axis;
+    Eigen::Matrix3d before_R_z;  ///< fixed, from the previous joint; the joint's axis is z
+    Eigen::Vector3d before_p;
     bool prismatic = false;
     int variable = 0;  ///< index into q: mimic joints share their leader's
     double multiplier = 1;
     double offset = 0;
   };
   Chain() = default;
+  template <class Visit>
+  geometry::Pose Walk(const Eigen::Ref<const Eigen::VectorXd>& q, Visit&& visit) const;
 
   std::vector<std::string> names_;
   std::vector<JointLimits> limits_;
   std::vector<int> joint_indices_;
   std::vector<Step> steps_;
-  geometry::Pose last_T_tip_;
+  Eigen::Matrix3d last_R_tip_;
+  Eigen::Vector3d last_p_tip_;
+  bool plain_ = true;  ///< only rotations, each with a variable of its own
   std::string base_link_, tip_link_;
 };
 
-/// base_T_link of every link of the model, in the order of model.links. `q` by joint index of the
+/// root_T_link of every link of the model, in the order of model.links. `q` by joint index of the
 /// model (fixed joints' values are ignored; mimic joints' values are derived).
 void LinkPoses(const RobotModel& model, const Eigen::Ref<const Eigen::VectorXd>& q,
-               std::vector<geometry::Pose>& base_T_links);
+               std::vector<geometry::Pose>& root_T_links);
 
 }  // namespace exemplar::kinematics

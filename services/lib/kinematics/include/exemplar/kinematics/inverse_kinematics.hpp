@@ -2,9 +2,9 @@
 // Pose inverse kinematics: one pose, one answer within limits.
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "exemplar/base/result.hpp"
-#include "exemplar/base/rng.hpp"
 #include "exemplar/kinematics/chain.hpp"
 
 namespace exemplar::kinematics {
@@ -12,12 +12,13 @@ namespace exemplar::kinematics {
 struct IkOptions {
   double position_tolerance_m = 1e-5;
   double rotation_tolerance_rad = 1e-5;
-  bool use_rotation = true;  ///< false: position only
-  /// Pull towards this posture within the null space; empty: none.
+  bool use_rotation = true;     ///< false: position only
+  bool free_tool_roll = false;  ///< true: the tool's z axis must point right, its turn is free
+  /// The posture (dof values) to come as near to as the pose allows, by least squares along the
+  /// null space; empty: none.
   Eigen::VectorXd preferred = {};
-  double preferred_weight = 1e-3;
-  int max_iterations = 100;  ///< of one descent
-  int max_restarts = 20;     ///< from random postures, after the seed
+  int max_iterations = 100;  ///< of one descent; one that makes no headway ends sooner
+  int max_restarts = 40;     ///< from random postures, after the seed
   std::uint64_t random_seed = 1;
 };
 
@@ -30,8 +31,9 @@ struct IkSolution {
 };
 
 /// A bounded Levenberg-Marquardt descent with restarts: limits are active bounds, never clamped
-/// afterwards. Deterministic for a seed. kFailedPrecondition with the best errors reached when the
-/// pose is not met. Precondition: seed.size() == chain.dof().
+/// afterwards (a seed outside them starts at the nearest posture within). Deterministic for a seed.
+/// kFailedPrecondition with the best errors reached when the pose is not met; kInvalidArgument for
+/// a pose or seed that is not finite. Precondition: seed.size() == chain.dof().
 Result<IkSolution> SolveIk(const Chain& chain, const geometry::Pose& base_T_tool,
                            const Eigen::Ref<const Eigen::VectorXd>& seed,
                            const IkOptions& options = {});

@@ -1,5 +1,5 @@
 #pragma once
-// A robot as read from a URDF: a tree of links and joints. Plain values; urdfdom stays inside.
+// A robot as read from a URDF: a tree of links and joints, as plain values.
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -57,12 +57,18 @@ struct Link {
 
 enum class JointType { kFixed, kRevolute, kContinuous, kPrismatic };
 
+// Used where a URDF says nothing: it has no acceleration limits, and continuous joints may go
+// without any.
+inline constexpr double kDefaultAcceleration = 10.0;  // rad/s^2 or m/s^2
+inline constexpr double kDefaultVelocity = 3.0;       // rad/s
+inline constexpr double kDefaultEffort = 100.0;       // N m
+
 struct JointLimits {
   double lower = 0;  ///< rad or m; -infinity for continuous joints
   double upper = 0;
   double velocity = 0;      ///< rad/s or m/s, positive
   double effort = 0;        ///< N m or N, positive
-  double acceleration = 0;  ///< rad/s^2 or m/s^2; URDF has none: a stated default
+  double acceleration = 0;  ///< rad/s^2 or m/s^2; kDefaultAcceleration unless robot.yaml says
 };
 
 struct Mimic {
