@@ -5,8 +5,10 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "exemplar/base/result.hpp"
 #include "exemplar/base/stamp.hpp"
 #include "exemplar/geometry/pose.hpp"
 
@@ -40,6 +42,7 @@ struct Trial {
   std::string source;   ///< file or recording it came from
   Stamp start;          ///< wall time of time_s = 0; zero when unknown
   ScalarSeries joints;  ///< rad (revolute) or m (prismatic): the demonstrator's own
+  std::vector<std::string> prismatic_joints;  ///< those of `joints` that are in m
   std::vector<PoseSeries> end_effectors;
   std::vector<PoseSeries> objects;
   ScalarSeries hands;    ///< opening, 0 closed to 1 open; channel "" for the main hand
