@@ -31,6 +31,7 @@ struct UniformTrial {
   std::vector<std::string> object_names;
   std::vector<std::vector<geometry::Pose>> base_T_object;  ///< [object][frame]
   std::vector<bool> object_has_orientation;
+  double cutoff_hz = 0;            ///< low-pass of the motion; 0: none was needed
   std::vector<std::string> notes;  ///< cut-off chosen, repairs
 };
 

@@ -1,0 +1,87 @@
+#include "static_pose.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "exemplar/signal/statistics.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+constexpr int kBlocks = 6;
+
+// Medians of each column over `kBlocks` stretches of the samples, and the deviation that noise
+// gives them.
+struct BlockMedians {
+  Eigen::MatrixXd medians;  // blocks x columns
+  double noise = 0;         // of one median, all columns together
+};
+
+BlockMedians MediansOf(const Eigen::MatrixXd& samples) {
+  const Eigen::Index blocks = std::min<Eigen::Index>(kBlocks, samples.rows());
+  BlockMedians result;
+  result.medians.resize(blocks, samples.cols());
+  double variance = 0;
+  for (Eigen::Index c = 0; c < samples.cols(); ++c) {
+    for (Eigen::Index b = 0; b < blocks; ++b) {
+      const Eigen::Index first = b * samples.rows() / blocks;
+      const Eigen::Index last = (b + 1) * samples.rows() / blocks;
+      result.medians(b, c) = signal::Median(samples.col(c).segment(first, last - first));
+    }
+    const double noise = signal::NoiseDeviation(samples.col(c));
+    variance += noise * noise;
+  }
+  // The median of n normal values has pi / 2 times the variance of their mean.
+  const double per_block = static_cast<double>(samples.rows()) / static_cast<double>(blocks);
+  result.noise = std::sqrt(variance * 1.5707963267948966 / per_block);
+  return result;
+}
+
+double LargestDistance(const Eigen::MatrixXd& points) {
+  double largest = 0;
+  for (Eigen::Index a = 0; a < points.rows(); ++a) {
+    for (Eigen::Index b = a + 1; b < points.rows(); ++b) {
+      largest = std::max(largest, (points.row(a) - points.row(b)).norm());
+    }
+  }
+  return largest;
+}
+
+Eigen::RowVectorXd ColumnMedians(const Eigen::MatrixXd& samples) {
+  Eigen::RowVectorXd medians(samples.cols());
+  for (Eigen::Index c = 0; c < samples.cols(); ++c) medians[c] = signal::Median(samples.col(c));
+  return medians;
+}
+
+}  // namespace
+
+std::optional<geometry::Pose> StaticPose(const demonstration::PoseSeries& series, double extent_m) {
+  constexpr double kNoiseDeviations = 6;
+  constexpr double kPartOfExtent = 0.005;
+  constexpr double kLeastTurn_rad = 0.02;
+  const auto n = static_cast<Eigen::Index>(series.size());
+  Eigen::MatrixXd positions(n, 3);
+  Eigen::MatrixXd quaternions(n, 4);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const geometry::Pose& pose = series.base_T_frame[static_cast<std::size_t>(k)];
+    positions.row(k) = pose.translation;
+    quaternions.row(k) = pose.rotation.coeffs();
+  }
+  const BlockMedians position = MediansOf(positions);
+  if (LargestDistance(position.medians) >
+      std::max(kNoiseDeviations * position.noise, kPartOfExtent * extent_m)) {
+    return std::nullopt;
+  }
+  geometry::Pose pose = geometry::Pose::FromTranslation(ColumnMedians(positions));
+  if (!series.has_orientation) return pose;
+  const BlockMedians rotation = MediansOf(quaternions);
+  // A quaternion moves half as far as the rotation turns.
+  if (LargestDistance(rotation.medians) >
+      std::max(kNoiseDeviations * rotation.noise, kLeastTurn_rad / 2)) {
+    return std::nullopt;
+  }
+  pose.rotation.coeffs() = ColumnMedians(quaternions).transpose().normalized();
+  return pose;
+}
+
+}  // namespace exemplar::learning
