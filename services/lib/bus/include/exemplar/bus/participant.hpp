@@ -1,0 +1,44 @@
+#pragma once
+// The network: Fast DDS behind the ports of ircp/bus.hpp. The only library that includes it.
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "exemplar/base/clock.hpp"
+#include "exemplar/base/log.hpp"
+#include "exemplar/base/result.hpp"
+#include "exemplar/ircp/bus.hpp"
+
+namespace exemplar::bus {
+
+struct ParticipantOptions {
+  int domain = 0;                   ///< 0 to 232
+  std::string station = "default";  ///< the partition of all its topics
+  std::string name = "exemplar";    ///< as discovery tools show it
+  /// Addresses or names ("127.0.0.1", "eth1") of the interfaces to use; empty: all.
+  std::vector<std::string> interfaces;
+  /// IPv4 addresses where other participants are sought beside multicast. The own machine is always
+  /// sought, so that a loopback interface without multicast will do.
+  std::vector<std::string> peers;
+  /// Shared memory for neighbours on the same machine, at most this much of it (less where
+  /// /dev/shm is small); 0: UDP only. Holds a few stereo pairs.
+  std::size_t shared_memory_bytes = std::size_t{16} << 20;
+  /// Stamps samples; null: the machine's. Outlives the participant.
+  const Clock* clock = nullptr;
+  /// Hears of malformed samples and incompatible writers; null: nobody. Outlives the participant.
+  Log* log = nullptr;
+};
+
+/// One program's place on the network of a station. Thread-safe, except that the participant must
+/// outlive its writers, readers and taps. Callbacks run on threads of the network, those of one
+/// reader never at once; a callback must not destroy its own reader.
+///
+/// Writers of reliable topics wait up to 2 s on destruction until what they wrote has arrived.
+class Participant : public ircp::Bus, public ircp::RawBus {
+ public:
+  static Result<std::unique_ptr<Participant>> Create(ParticipantOptions options);
+};
+
+}  // namespace exemplar::bus
