@@ -1,0 +1,146 @@
+"""Starts Exemplar's programs, talks to them by the command line, and ends them cleanly."""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+
+class Failure(Exception):
+    """Something went wrong that a person can read about."""
+
+
+class Process:
+    """A program of Exemplar in the background; its log goes to a file."""
+
+    def __init__(self, binary, arguments, log, needs_port=False):
+        self.name = binary.name
+        self.log = log
+        self.port_file = log.with_suffix(".port") if needs_port else None
+        if self.port_file:
+            self.port_file.unlink(missing_ok=True)
+            arguments = [*arguments, "--listen", "127.0.0.1:0", "--port-file", str(self.port_file)]
+        self._stderr = open(log, "ab")
+        self._process = subprocess.Popen(
+            [str(binary), *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=self._stderr, stderr=self._stderr
+        )
+
+    def address(self, timeout_s=20):
+        """HOST:PORT of its gRPC server, once it listens."""
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline:
+            self.check_alive()
+            if self.port_file.exists() and self.port_file.read_text().strip():
+                return f"127.0.0.1:{self.port_file.read_text().strip()}"
+            time.sleep(0.02)
+        raise Failure(f"{self.name} did not listen within {timeout_s} s:\n{self.tail()}")
+
+    def tail(self, lines=15):
+        return "\n".join(self.log.read_text(errors="replace").splitlines()[-lines:])
+
+    def check_alive(self):
+        if self._process.poll() is not None:
+            raise Failure(f"{self.name} ended with {self._process.returncode}:\n{self.tail()}")
+
+    def alive(self):
+        return self._process.poll() is None
+
+    def wait(self, timeout_s):
+        try:
+            code = self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            self.stop()
+            raise Failure(f"{self.name} did not end within {timeout_s:.0f} s:\n{self.tail()}") from None
+        if code != 0:
+            raise Failure(f"{self.name} ended with {code}:\n{self.tail()}")
+
+    def stop(self, grace_s=10):
+        """SIGTERM, then SIGKILL; returns whether it ended by itself with success."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGTERM)
+            try:
+                self._process.wait(grace_s)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+                return False
+        self._stderr.close()
+        return self._process.returncode == 0
+
+
+class System:
+    """All processes of one run, in one station and domain, with their files under `folder`."""
+
+    def __init__(self, binaries, folder, domain, station):
+        self.binaries = pathlib.Path(binaries)
+        self.folder = pathlib.Path(folder)
+        self.logs = self.folder / "logs"
+        self.logs.mkdir(parents=True, exist_ok=True)
+        self.bus = ["--domain", str(domain), "--station", station]
+        self.processes = []
+
+    def start(self, program, *arguments, server=False, bus=True):
+        if bus:
+            arguments = (*self.bus, *arguments)
+        process = Process(self.binaries / f"exemplar-{program}", arguments, self.logs / f"{program}.log", server)
+        self.processes.append(process)
+        return process
+
+    def cli(self, server, *arguments, timeout_s=300, as_json=True, stderr=None):
+        """Runs the command line; returns its JSON output (or text)."""
+        command = [str(self.binaries / "exemplar"), "--server", server, "--timeout", str(timeout_s)]
+        command += [*map(str, arguments), *(["--format", "json"] if as_json else [])]
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=stderr or subprocess.PIPE, text=True, timeout=timeout_s + 30
+        )
+        if done.returncode != 0:
+            raise Failure(f"exemplar {' '.join(map(str, arguments))}: exit code {done.returncode}: {(done.stderr or '').strip()}")
+        if not as_json:
+            return done.stdout
+        try:
+            return json.loads(done.stdout)
+        except json.JSONDecodeError as error:
+            raise Failure(f"exemplar {' '.join(map(str, arguments))} printed no JSON ({error}): {done.stdout[:200]}") from None
+
+    def stop(self):
+        """Ends all processes, last started first; names those that did not end well."""
+        unclean = []
+        for process in reversed(self.processes):
+            if not process.stop():
+                unclean.append(process.name)
+        self.processes.clear()
+        return unclean
+
+
+def wait_until(what, condition, timeout_s, interval_s=0.1):
+    """Polls `condition` until it returns something true, and returns that."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise Failure(f"waited {timeout_s:.0f} s for {what}, in vain")
+        time.sleep(interval_s)
+
+
+class Narrator:
+    """What a person reads on stderr while it runs."""
+
+    def __init__(self):
+        self.colour = sys.stderr.isatty() and not os.environ.get("NO_COLOR")
+        self.started = time.monotonic()
+
+    def _print(self, mark, text):
+        print(f"{mark} {text}", file=sys.stderr, flush=True)
+
+    def step(self, text):
+        mark = f"[{time.monotonic() - self.started:5.1f} s]"
+        self._print(f"\033[1;36m{mark}\033[0m" if self.colour else mark, text)
+
+    def detail(self, text):
+        for line in text.splitlines():
+            self._print(" " * 9, line)
