@@ -1,0 +1,22 @@
+#pragma once
+// The convex hull of a point cloud.
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+
+namespace exemplar::collision {
+
+struct Hull {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::array<int, 3>> faces;  ///< counter-clockwise seen from outside
+};
+
+/// Quickhull (Barber, Dobkin & Huhdanpaa 1996). Points nearer to a face than 1e-9 of the cloud's
+/// size count as inside. kInvalidArgument when the points span no volume.
+Result<Hull> ConvexHull(std::span<const Eigen::Vector3d> points);
+
+}  // namespace exemplar::collision

@@ -1,0 +1,30 @@
+#include "exemplar/collision/scene.hpp"
+
+namespace exemplar::collision {
+
+Scene MakeScene(const scene::Description& description,
+                const std::vector<geometry::NamedPose>& objects) {
+  Scene scene;
+  for (const scene::Obstacle& obstacle : description.obstacles) {
+    scene.objects.push_back({obstacle.name, obstacle.base_T_shape, obstacle.shape});
+  }
+  for (const scene::Button& button : description.buttons) {
+    geometry::Pose base_T_object = button.base_T_object;
+    for (const geometry::NamedPose& seen : objects) {
+      if (seen.name != button.name) continue;
+      base_T_object.translation = seen.base_T_object.translation;
+      if (seen.has_orientation) base_T_object.rotation = seen.base_T_object.rotation;
+    }
+    // From the cap's upper face down to the foot of the housing.
+    geometry::Pose object_T_shape;
+    object_T_shape.translation =
+        button.object_p_contact - 0.5 * button.height_m * button.object_normal;
+    object_T_shape.rotation =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), button.object_normal);
+    scene.objects.push_back({button.name, base_T_object * object_T_shape,
+                             kinematics::Cylinder{button.radius_m, button.height_m}});
+  }
+  return scene;
+}
+
+}  // namespace exemplar::collision
