@@ -1,0 +1,152 @@
+#include "convert_executor.hpp"
+
+namespace exemplar::rpc {
+
+void ToProto(const api::ExecuteRequest& request, v1::SkillExecution* message) {
+  message->mutable_skill()->set_name(Utf8(request.skill));
+  message->mutable_skill()->set_version(request.version);
+  ToProto(request.objects, message->mutable_objects());
+  message->set_speed(request.speed);
+}
+
+Result<api::ExecuteRequest> FromProto(const v1::SkillExecution& message, std::string_view field) {
+  const std::string place(field);
+  if (message.skill().name().empty()) {
+    return InvalidArgument(place + ".skill.name is empty", place + ".skill.name");
+  }
+  api::ExecuteRequest request;
+  request.skill = message.skill().name();
+  request.version = message.skill().version();
+  Result<std::vector<geometry::NamedPose>> objects =
+      FromProto(message.objects(), place + ".objects");
+  if (!objects) return objects.error();
+  request.objects = *std::move(objects);
+  request.speed = message.speed() == 0 ? 1 : message.speed();
+  if (!(request.speed > 0 && request.speed <= 1)) {
+    return InvalidArgument(
+        place + ".speed is " + std::to_string(request.speed) + ", must be over 0 and at most 1",
+        place + ".speed");
+  }
+  return request;
+}
+
+void ToProto(const api::PlanSummary& plan, v1::PlanSummary* message) {
+  message->set_duration_s(plan.duration_s);
+  message->set_frames(plan.frames);
+  message->set_max_position_error_m(plan.max_position_error_m);
+  message->set_max_contact_error_m(plan.max_contact_error_m);
+  message->set_clearance_m(plan.clearance_m);
+  message->set_clearance_between(Utf8(plan.clearance_between));
+  message->set_time_stretch(plan.time_stretch);
+  ToProto(plan.warnings, message->mutable_warnings());
+}
+
+api::PlanSummary FromProto(const v1::PlanSummary& message) {
+  api::PlanSummary plan;
+  plan.duration_s = message.duration_s();
+  plan.frames = message.frames();
+  plan.max_position_error_m = message.max_position_error_m();
+  plan.max_contact_error_m = message.max_contact_error_m();
+  plan.clearance_m = message.clearance_m();
+  plan.clearance_between = message.clearance_between();
+  plan.time_stretch = message.time_stretch();
+  plan.warnings = FromProto(message.warnings());
+  return plan;
+}
+
+void ToProto(const api::ExecutionFeedback& feedback, v1::ExecutionFeedback* message) {
+  message->set_state(Utf8(feedback.state));
+  message->set_time_s(feedback.time_s);
+  message->set_duration_s(feedback.duration_s);
+  message->set_tracking_error_rad(feedback.tracking_error_rad);
+  message->set_touch_n(feedback.touch_n);
+}
+
+api::ExecutionFeedback FromProto(const v1::ExecutionFeedback& message) {
+  api::ExecutionFeedback feedback;
+  feedback.state = message.state();
+  feedback.time_s = message.time_s();
+  feedback.duration_s = message.duration_s();
+  feedback.tracking_error_rad = message.tracking_error_rad();
+  feedback.touch_n = message.touch_n();
+  return feedback;
+}
+
+void ToProto(const api::ExecutionResult& result, v1::ExecutionResult* message) {
+  message->set_state(Utf8(result.state));
+  message->set_detail(Utf8(result.detail));
+  ToProto(result.plan, message->mutable_plan());
+  message->set_tracking_error_rad(result.tracking_error_rad);
+  message->set_clearance_m(result.clearance_m);
+  if (result.contact_error_m) message->set_contact_error_m(*result.contact_error_m);
+  if (result.touch_onset_s) message->set_touch_onset_s(*result.touch_onset_s);
+  message->set_touch_max_n(result.touch_max_n);
+  message->set_commands_sent(result.commands_sent);
+  message->set_lateness_p99_s(result.lateness_p99_s);
+  message->set_lateness_max_s(result.lateness_max_s);
+  ToProto(result.objects, message->mutable_objects());
+  v1::PoseSeries* tool = message->mutable_tool();
+  ToProto(result.tool_time_s, tool->mutable_time_s());
+  PosesToProto(result.base_T_tool, tool->mutable_poses());
+  tool->set_has_orientation(true);
+}
+
+Result<api::ExecutionResult> FromProto(const v1::ExecutionResult& message) {
+  api::ExecutionResult result;
+  result.state = message.state();
+  result.detail = message.detail();
+  result.plan = FromProto(message.plan());
+  result.tracking_error_rad = message.tracking_error_rad();
+  result.clearance_m = message.clearance_m();
+  if (message.has_contact_error_m()) result.contact_error_m = message.contact_error_m();
+  if (message.has_touch_onset_s()) result.touch_onset_s = message.touch_onset_s();
+  result.touch_max_n = message.touch_max_n();
+  result.commands_sent = message.commands_sent();
+  result.lateness_p99_s = message.lateness_p99_s();
+  result.lateness_max_s = message.lateness_max_s();
+  Result<std::vector<geometry::NamedPose>> objects = FromProto(message.objects(), "result.objects");
+  if (!objects) return objects.error();
+  result.objects = *std::move(objects);
+  Result<demonstration::PoseSeries> tool = FromProto(message.tool(), "result.tool");
+  if (!tool) return tool.error();
+  result.base_T_tool = std::move(tool->base_T_frame);
+  result.tool_time_s = std::move(tool->time_s);
+  return result;
+}
+
+void ToProto(const api::RobotStatus& status, v1::GetRobotStatusResponse* message) {
+  message->set_state(Utf8(status.state));
+  message->set_detail(Utf8(status.detail));
+  message->set_speed(status.speed);
+  ToProto(status.joint_names, message->mutable_joint_names());
+  ToProto(status.joints, message->mutable_joints());
+  message->set_state_age_s(status.state_age_s);
+  ToProto(status.base_T_tool, true, message->mutable_tool());
+  for (const api::SeenObject& object : status.objects) {
+    v1::SeenObject* out = message->add_objects();
+    ToProto(object.pose, out->mutable_object());
+    out->set_age_s(object.age_s);
+  }
+}
+
+Result<api::RobotStatus> FromProto(const v1::GetRobotStatusResponse& message) {
+  api::RobotStatus status;
+  status.state = message.state();
+  status.detail = message.detail();
+  status.speed = message.speed();
+  status.joint_names = FromProto(message.joint_names());
+  status.joints = VectorFromProto(message.joints());
+  status.state_age_s = message.state_age_s();
+  Result<ReadPose> tool = FromProto(message.tool(), "tool");
+  if (!tool) return tool.error();
+  status.base_T_tool = tool->pose;
+  for (int i = 0; i < message.objects_size(); ++i) {
+    Result<geometry::NamedPose> pose =
+        FromProto(message.objects(i).object(), "objects[" + std::to_string(i) + "].object");
+    if (!pose) return pose.error();
+    status.objects.push_back({*std::move(pose), message.objects(i).age_s()});
+  }
+  return status;
+}
+
+}  // namespace exemplar::rpc

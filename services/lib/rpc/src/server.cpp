@@ -1,0 +1,116 @@
+#include "exemplar/rpc/server.hpp"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+
+#include <fstream>
+#include <vector>
+
+#include "exemplar/base/text.hpp"
+#include "server_call.hpp"
+
+namespace exemplar::rpc {
+namespace {
+
+/// The host of HOST:PORT.
+Result<std::string> HostOf(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) {
+    return InvalidArgument("listen address \"" + address + "\" is not HOST:PORT", "listen");
+  }
+  const std::optional<long long> port = ParseInteger(std::string_view(address).substr(colon + 1));
+  if (!port || *port < 0 || *port > 65535) {
+    return InvalidArgument(
+        "listen address \"" + address + "\": the port must be a number from 0 to 65535", "listen");
+  }
+  return address.substr(0, colon);
+}
+
+Status WritePortFile(const std::filesystem::path& file, int port) {
+  std::filesystem::path part = file;
+  part += ".part";
+  {
+    std::ofstream out(part, std::ios::trunc);
+    out << port << "\n";
+    out.flush();
+    if (!out) return InvalidArgument(part.string() + ": cannot be written", "port_file");
+  }
+  std::error_code error;
+  std::filesystem::rename(part, file, error);
+  if (error) return InvalidArgument(file.string() + ": " + error.message(), "port_file");
+  return {};
+}
+
+class GrpcServer final : public Server {
+ public:
+  explicit GrpcServer(const ServerOptions& options) : shared_(options) {}
+  GrpcServer(const GrpcServer&) = delete;
+  GrpcServer& operator=(const GrpcServer&) = delete;
+  ~GrpcServer() override {
+    if (server_) GrpcServer::Shutdown(std::chrono::seconds(1));
+  }
+
+  Status Start(Services services) {
+    const ServerOptions& options = shared_.options();
+    const Result<std::string> host = HostOf(options.listen);
+    if (!host) return host.error();
+    if (services.trials) services_.push_back(MakeTrialService(shared_, *services.trials));
+    if (services.skills) services_.push_back(MakeSkillService(shared_, *services.skills));
+    if (services.executor) services_.push_back(MakeExecutorService(shared_, *services.executor));
+    if (services.recorder) services_.push_back(MakeRecorderService(shared_, *services.recorder));
+
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    grpc::ServerBuilder builder;
+    // Two servers on one port would share its callers at random.
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
+    builder.SetMaxReceiveMessageSize(static_cast<int>(options.max_message_bytes));
+    builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port_);
+    for (const auto& service : services_) builder.RegisterService(service.get());
+    server_ = builder.BuildAndStart();
+    if (!server_ || port_ <= 0) {
+      return Unavailable("cannot listen on " + options.listen +
+                         ": the port is taken, or the host is none of this machine's");
+    }
+    address_ = *host + ":" + std::to_string(port_);
+    SetServing(true);
+    if (options.port_file.empty()) return {};
+    return WritePortFile(options.port_file, port_);
+  }
+
+  int port() const override { return port_; }
+  const std::string& address() const override { return address_; }
+
+  void SetServing(bool serving) override {
+    server_->GetHealthCheckService()->SetServingStatus(serving);
+  }
+
+  void Shutdown(Duration grace) override {
+    shared_.shutdown().request_stop();
+    server_->Shutdown(std::chrono::system_clock::now() +
+                      std::chrono::duration_cast<std::chrono::system_clock::duration>(grace));
+  }
+
+ private:
+  ServerShared shared_;
+  std::vector<std::unique_ptr<grpc::Service>> services_;
+  std::unique_ptr<grpc::Server> server_;
+  int port_ = 0;
+  std::string address_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Server>> Server::Create(const ServerOptions& options, Services services) {
+  auto server = std::make_unique<GrpcServer>(options);
+  if (const Status status = server->Start(services); !status) return status.error();
+  return std::unique_ptr<Server>(std::move(server));
+}
+
+}  // namespace exemplar::rpc
