@@ -38,4 +38,17 @@ struct Clients {
 /// Does not wait for the server. Errors: an address that is none.
 Result<Clients> Connect(const ClientOptions& options);
 
+/// One skill, asked again and again as its objects move, over one stream: a question costs less
+/// than a call. Thread-compatible.
+class MotionStream {
+ public:
+  virtual ~MotionStream() = default;
+  /// An error of the question leaves the stream open; one of the connection is final.
+  virtual Result<demonstration::SkillMotion> Ask(const demonstration::SkillQuery& query) = 0;
+};
+
+/// Errors: an address that is none. Whether the server answers shows at the first question.
+Result<std::unique_ptr<MotionStream>> OpenMotionStream(const ClientOptions& options,
+                                                       const std::string& skill, int version);
+
 }  // namespace exemplar::rpc

@@ -1,0 +1,93 @@
+#pragma once
+// What every call on the client's side has in common.
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/support/sync_stream.h>
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <string_view>
+
+#include "call_status.hpp"
+#include "exemplar/rpc/client.hpp"
+
+namespace exemplar::rpc {
+
+/// A channel and what its calls need. Thread-safe.
+class Connection {
+ public:
+  static Result<std::shared_ptr<Connection>> Create(const ClientOptions& options);
+
+  const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
+  const std::string& address() const { return options_.server; }
+
+  enum class Length { kShort, kLong, kOpenEnded };
+  /// Waits for the server if the options say so; sets deadline and request id.
+  std::unique_ptr<grpc::ClientContext> Begin(Length length = Length::kShort);
+
+ private:
+  explicit Connection(const ClientOptions& options);
+  const ClientOptions options_;
+  const std::string request_id_;
+  const std::shared_ptr<grpc::Channel> channel_;
+  std::atomic<std::uint64_t> calls_{0};
+};
+
+/// Cancels the call when `stop` is requested, for as long as it lives.
+class CancelOnStop {
+ public:
+  CancelOnStop(grpc::ClientContext& context, std::stop_token stop)
+      : callback_(std::move(stop), [&context] { context.TryCancel(); }) {}
+
+ private:
+  std::stop_callback<std::function<void()>> callback_;
+};
+
+/// One request, one answer. `method` as `&v1::TrialService::Stub::Get`.
+template <class Response, class Stub, class Request>
+Result<Response> Call(Connection& connection, Stub& stub,
+                      grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                      const Request& request,
+                      Connection::Length length = Connection::Length::kShort) {
+  const auto context = connection.Begin(length);
+  Response response;
+  const grpc::Status status = (stub.*method)(context.get(), request, &response);
+  if (!status.ok()) return FromGrpc(status, connection.address());
+  return response;
+}
+
+/// Sends a message with the header, then the file's bytes in chunks.
+template <class Request>
+void Upload(grpc::ClientWriter<Request>& writer, const Request& header, std::string_view file) {
+  constexpr std::size_t kChunk = std::size_t{256} << 10;
+  bool open = writer.Write(header);
+  for (std::size_t sent = 0; open && sent < file.size(); sent += kChunk) {
+    Request request;
+    request.mutable_chunk()->set_data(std::string(file.substr(sent, kChunk)));
+    // False: the server has its answer already, and Finish gets it.
+    open = writer.Write(request);
+  }
+  if (open) writer.WritesDone();
+}
+
+/// Collects the chunks of a stream.
+template <class Response>
+Result<std::string> Download(const Connection& connection, grpc::ClientReader<Response>& reader) {
+  std::string file;
+  Response response;
+  while (reader.Read(&response)) file += response.chunk().data();
+  const grpc::Status status = reader.Finish();
+  if (!status.ok()) return FromGrpc(status, connection.address());
+  return file;
+}
+
+std::unique_ptr<api::TrialApi> MakeTrialClient(std::shared_ptr<Connection> connection);
+std::unique_ptr<api::SkillApi> MakeSkillClient(std::shared_ptr<Connection> connection);
+std::unique_ptr<api::ExecutorApi> MakeExecutorClient(std::shared_ptr<Connection> connection);
+std::unique_ptr<api::RecorderApi> MakeRecorderClient(std::shared_ptr<Connection> connection);
+
+}  // namespace exemplar::rpc
