@@ -20,6 +20,9 @@ namespace {
 
 using tinyxml2::XMLElement;
 
+/// Files written by programs hold inertias such as -5e-20.
+constexpr double kRounding = 1e-12;
+
 std::string Quoted(std::string_view text) { return '"' + std::string(text) + '"'; }
 
 std::vector<std::string_view> SplitWords(std::string_view text) {
@@ -123,6 +126,15 @@ class UrdfReader {
     return numbers->front();
   }
 
+  Result<double> ReadExtent(const XMLElement& element, const char* attribute) const {
+    Result<double> number = ReadNumber(element, attribute);
+    if (number && *number < 0) {
+      return At(element, std::string(element.Name()) + " " + attribute + " is " +
+                             FormatDouble(*number) + ", must not be negative");
+    }
+    return number;
+  }
+
   Result<double> ReadPositive(const XMLElement& element, const char* attribute,
                               std::optional<double> otherwise = std::nullopt) const {
     Result<double> number = ReadNumber(element, attribute, otherwise);
@@ -193,7 +205,8 @@ class UrdfReader {
 
   // ---- Links ----
 
-  Result<Shape> ReadShape(const XMLElement& parent) const {
+  /// Nothing for a shape without extent, with which some files mark a place.
+  Result<std::optional<Shape>> ReadShape(const XMLElement& parent) const {
     const XMLElement* geometry = parent.FirstChildElement("geometry");
     if (geometry == nullptr) {
       return At(parent, "<" + std::string(parent.Name()) + "> has no <geometry>");
@@ -201,39 +214,44 @@ class UrdfReader {
     const XMLElement* shape = geometry->FirstChildElement();
     if (shape == nullptr) return At(*geometry, "<geometry> is empty");
     const std::string_view kind = shape->Name();
-    if (kind == "box") {
-      Result<Eigen::Vector3d> size = ReadVector(*shape, "size");
-      if (!size) return size.error();
-      if ((size->array() <= 0).any()) {
-        return At(*shape, "box size is " + Quoted(shape->Attribute("size")) +
-                              ", every edge must be positive");
-      }
-      return Shape(Box{*size});
-    }
+    if (kind == "box") return ReadBox(*shape);
     if (kind == "sphere") {
-      Result<double> radius = ReadPositive(*shape, "radius");
+      Result<double> radius = ReadExtent(*shape, "radius");
       if (!radius) return radius.error();
-      return Shape(Sphere{*radius});
+      return *radius == 0 ? std::nullopt : std::optional<Shape>(Sphere{*radius});
     }
     if (kind == "cylinder") {
-      Result<double> radius = ReadPositive(*shape, "radius");
+      Result<double> radius = ReadExtent(*shape, "radius");
       if (!radius) return radius.error();
-      Result<double> length = ReadPositive(*shape, "length");
+      Result<double> length = ReadExtent(*shape, "length");
       if (!length) return length.error();
-      return Shape(Cylinder{*radius, *length});
+      return *radius == 0 || *length == 0 ? std::nullopt
+                                          : std::optional<Shape>(Cylinder{*radius, *length});
     }
-    if (kind == "mesh") {
-      const char* file = shape->Attribute("filename");
-      if (file == nullptr || *file == '\0') return At(*shape, "mesh filename is missing");
-      Result<Eigen::Vector3d> scale = ReadVector(*shape, "scale", 1.0);
-      if (!scale) return scale.error();
-      if ((scale->array() == 0).any()) {
-        return At(*shape,
-                  "mesh scale is " + Quoted(shape->Attribute("scale")) + ", no part may be zero");
-      }
-      return Shape(Mesh{ResolveMeshPath(file, folder_), *scale});
-    }
+    if (kind == "mesh") return ReadMesh(*shape);
     return At(*shape, "<" + std::string(kind) + "> is not a shape: box, sphere, cylinder or mesh");
+  }
+
+  Result<std::optional<Shape>> ReadBox(const XMLElement& shape) const {
+    Result<Eigen::Vector3d> size = ReadVector(shape, "size");
+    if (!size) return size.error();
+    if (size->minCoeff() < 0) {
+      return At(shape,
+                "box size is " + Quoted(shape.Attribute("size")) + ", no edge may be negative");
+    }
+    return size->minCoeff() == 0 ? std::nullopt : std::optional<Shape>(Box{*size});
+  }
+
+  Result<std::optional<Shape>> ReadMesh(const XMLElement& shape) const {
+    const char* file = shape.Attribute("filename");
+    if (file == nullptr || *file == '\0') return At(shape, "mesh filename is missing");
+    Result<Eigen::Vector3d> scale = ReadVector(shape, "scale", 1.0);
+    if (!scale) return scale.error();
+    if ((scale->array() == 0).any()) {
+      return At(shape,
+                "mesh scale is " + Quoted(shape.Attribute("scale")) + ", no part may be zero");
+    }
+    return std::optional<Shape>(Mesh{ResolveMeshPath(file, folder_), *scale});
   }
 
   Result<std::vector<Geometry>> ReadGeometries(const XMLElement& link, const char* kind) const {
@@ -242,9 +260,9 @@ class UrdfReader {
          e = e->NextSiblingElement(kind)) {
       Result<geometry::Pose> origin = ReadOrigin(*e);
       if (!origin) return origin.error();
-      Result<Shape> shape = ReadShape(*e);
+      Result<std::optional<Shape>> shape = ReadShape(*e);
       if (!shape) return shape.error();
-      geometries.push_back({*origin, std::move(*shape)});
+      if (*shape) geometries.push_back({*origin, std::move(**shape)});
     }
     return geometries;
   }
@@ -274,7 +292,7 @@ class UrdfReader {
       Result<double> value =
           ReadNumber(*inertia, attribute, diagonal ? std::optional<double>() : std::optional(0.0));
       if (!value) return value.error();
-      if (diagonal && *value < 0) {
+      if (diagonal && *value < -kRounding) {
         return At(*inertia, "inertia " + std::string(attribute) + " is " + FormatDouble(*value) +
                                 ", must not be negative");
       }
