@@ -7,6 +7,7 @@ void ToProto(const api::ExecuteRequest& request, v1::SkillExecution* message) {
   message->mutable_skill()->set_version(request.version);
   ToProto(request.objects, message->mutable_objects());
   message->set_speed(request.speed);
+  if (request.start) ToProto(*request.start, true, message->mutable_start());
 }
 
 Result<api::ExecuteRequest> FromProto(const v1::SkillExecution& message, std::string_view field) {
@@ -21,6 +22,14 @@ Result<api::ExecuteRequest> FromProto(const v1::SkillExecution& message, std::st
       FromProto(message.objects(), place + ".objects");
   if (!objects) return objects.error();
   request.objects = *std::move(objects);
+  if (message.has_start()) {
+    Result<ReadPose> start = FromProto(message.start(), place + ".start");
+    if (!start) return start.error();
+    if (!start->has_orientation) {
+      return InvalidArgument(place + ".start.rotation is missing", place + ".start.rotation");
+    }
+    request.start = start->pose;
+  }
   request.speed = message.speed() == 0 ? 1 : message.speed();
   if (!(request.speed > 0 && request.speed <= 1)) {
     return InvalidArgument(

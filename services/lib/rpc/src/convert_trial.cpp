@@ -68,6 +68,7 @@ void ToProto(const demonstration::Trial& trial, v1::Trial* message) {
   if (!trial.wrench.empty()) ToProto(trial.wrench, message->mutable_wrench());
   if (!trial.label.empty()) ToProto(trial.label, message->mutable_label());
   ToProto(trial.notices, message->mutable_notices());
+  ToProto(trial.prismatic_joints, message->mutable_prismatic_joints());
 }
 
 Result<demonstration::Trial> FromProto(const v1::Trial& message, std::string_view field) {
@@ -76,6 +77,7 @@ Result<demonstration::Trial> FromProto(const v1::Trial& message, std::string_vie
   trial.source = message.source();
   if (message.has_start()) trial.start = FromProto(message.start());
   trial.notices = FromProto(message.notices());
+  trial.prismatic_joints = FromProto(message.prismatic_joints());
   for (const Status& status :
        {ReadSeries(message.joints(), place + ".joints", trial.joints),
         ReadSeries(message.end_effectors(), place + ".end_effectors", trial.end_effectors),
