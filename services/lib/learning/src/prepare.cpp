@@ -30,12 +30,23 @@ struct Smoothed {
   Eigen::MatrixXd values;  // one row a frame of the base
   double cutoff_hz = 0;
   double noise = 0;
+  std::size_t repeated = 0;  // samples that only repeat the one before
 };
 
 // Onto a grid at least as fine as the source, low-pass there, then down to the base.
-Smoothed Smooth(const std::vector<double>& time_s, const Eigen::MatrixXd& values, const Base& base,
+Smoothed Smooth(std::vector<double> time_s, Eigen::MatrixXd values, const Base& base,
                 double cutoff_hz) {
   Smoothed result;
+  const std::vector<std::size_t> news = signal::FindNews(time_s, values);
+  if (news.size() < time_s.size()) {
+    result.repeated = time_s.size() - news.size();
+    for (std::size_t k = 0; k < news.size(); ++k) {
+      time_s[k] = time_s[news[k]];
+      values.row(static_cast<Eigen::Index>(k)) = values.row(static_cast<Eigen::Index>(news[k]));
+    }
+    time_s.resize(news.size());
+    values.conservativeResize(static_cast<Eigen::Index>(news.size()), Eigen::NoChange);
+  }
   const double interval_s = signal::MedianInterval(time_s);
   const double source_hz = interval_s > 0 ? 1 / interval_s : base.rate_hz();
   const int fold = std::clamp(static_cast<int>(std::ceil(source_hz / base.rate_hz() - 0.01)), 1,
@@ -67,8 +78,12 @@ Smoothed Smooth(const std::vector<double>& time_s, const Eigen::MatrixXd& values
 
 std::string CutoffNote(const std::string& stream, const Smoothed& smoothed,
                        const std::string& unit) {
-  if (smoothed.cutoff_hz == 0) return stream + ": no low-pass, no noise found";
-  std::string note = stream + ": cut-off " + FormatFixed(smoothed.cutoff_hz, 1) + " Hz";
+  std::string note = stream + ": ";
+  if (smoothed.repeated > 0) {
+    note += std::to_string(smoothed.repeated) + " samples repeat the one before, taken as held; ";
+  }
+  if (smoothed.cutoff_hz == 0) return note + "no low-pass, no noise found";
+  note += "cut-off " + FormatFixed(smoothed.cutoff_hz, 1) + " Hz";
   if (smoothed.noise > 0) {
     char text[32];
     std::snprintf(text, sizeof text, "%.2g", smoothed.noise);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <numeric>
 
 #include "exemplar/signal/statistics.hpp"
 
@@ -58,6 +59,40 @@ std::vector<Gap> FindGaps(std::span<const double> times_s, double limit_s) {
     if (times_s[k] - times_s[k - 1] > limit_s) gaps.push_back({times_s[k - 1], times_s[k]});
   }
   return gaps;
+}
+
+std::vector<std::size_t> FindNews(std::span<const double> times_s,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  constexpr double kLeastPart = 0.2;
+  constexpr double kStillness = 4;
+  assert(static_cast<std::size_t>(values.rows()) == times_s.size());
+  const std::size_t n = times_s.size();
+  std::vector<std::size_t> news;
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    if (k == 0 || values.row(row) != values.row(row - 1)) news.push_back(k);
+  }
+  const bool held = static_cast<double>(n - news.size()) >= kLeastPart * static_cast<double>(n);
+  std::vector<std::size_t> kept;
+  if (!held || news.size() < 3) {
+    kept.resize(n);
+    std::iota(kept.begin(), kept.end(), std::size_t{0});
+    return kept;
+  }
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < news.size(); ++i) {
+    intervals.push_back(times_s[news[i]] - times_s[news[i - 1]]);
+  }
+  const double usual_s = Quantile(std::move(intervals), 0.5);
+  for (std::size_t i = 0; i < news.size(); ++i) {
+    kept.push_back(news[i]);
+    const std::size_t last = (i + 1 < news.size() ? news[i + 1] : n) - 1;
+    const bool end = i + 1 == news.size();
+    if (last > news[i] && (end || times_s[last] - times_s[news[i]] > kStillness * usual_s)) {
+      kept.push_back(last);
+    }
+  }
+  return kept;
 }
 
 }  // namespace exemplar::signal
