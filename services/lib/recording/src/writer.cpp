@@ -1,0 +1,330 @@
+#include "exemplar/recording/writer.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "compression.hpp"
+#include "record_codec.hpp"
+
+namespace exemplar::recording {
+namespace {
+
+/// Strings, maps and schema texts stand behind 32-bit lengths.
+constexpr std::uint64_t kLongestField = std::numeric_limits<std::uint32_t>::max();
+
+std::uint64_t SizeOf(const StringMap& map) {
+  std::uint64_t size = 0;
+  for (const auto& [key, value] : map) size += 8 + key.size() + value.size();
+  return size;
+}
+
+Status CheckLength(std::uint64_t size, const std::string& field) {
+  if (size <= kLongestField) return {};
+  return InvalidArgument(field + ": " + std::to_string(size) + " bytes do not fit the format",
+                         field);
+}
+
+class McapWriter final : public Writer {
+ public:
+  McapWriter(ByteSink& sink, WriterOptions options) : sink_(sink), options_(std::move(options)) {}
+
+  Status Begin() {
+    scratch_.assign(std::begin(kMagic), std::end(kMagic));
+    Encode(Header{options_.profile, options_.library}, scratch_);
+    return Put(scratch_);
+  }
+
+  Status AddSchema(const Schema& schema) override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (schema.id == 0) {
+      return InvalidArgument("schema \"" + schema.name + "\": id 0 means no schema", "schema.id");
+    }
+    if (const Status size = CheckLength(schema.data.size(), "schema.data"); !size.ok()) return size;
+    const auto [known, inserted] = schemas_.try_emplace(schema.id, schema);
+    if (!inserted) {
+      if (known->second == schema) return {};
+      return InvalidArgument("schema \"" + schema.name + "\": id " + std::to_string(schema.id) +
+                                 " is the schema \"" + known->second.name + "\" already",
+                             "schema.id");
+    }
+    ++statistics_.schema_count;
+    return PutInData([&](Bytes& out) { Encode(schema, out); });
+  }
+
+  Status AddChannel(const Channel& channel) override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (channel.schema_id != 0 && !schemas_.contains(channel.schema_id)) {
+      return InvalidArgument("channel \"" + channel.topic + "\": schema " +
+                                 std::to_string(channel.schema_id) + " was not added",
+                             "channel.schema_id");
+    }
+    if (const Status size = CheckLength(SizeOf(channel.metadata), "channel.metadata"); !size.ok()) {
+      return size;
+    }
+    const auto [known, inserted] = channels_.try_emplace(channel.id, channel);
+    if (!inserted) {
+      if (known->second == channel) return {};
+      return InvalidArgument("channel \"" + channel.topic + "\": id " + std::to_string(channel.id) +
+                                 " is the channel of \"" + known->second.topic + "\" already",
+                             "channel.id");
+    }
+    ++statistics_.channel_count;
+    return PutInData([&](Bytes& out) { Encode(channel, out); });
+  }
+
+  Status Write(const MessageView& message) override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (!channels_.contains(message.channel_id)) {
+      return InvalidArgument(
+          "message: channel " + std::to_string(message.channel_id) + " was not added",
+          "message.channel_id");
+    }
+    CountMessage(message);
+    if (!options_.chunks) return PutInData([&](Bytes& out) { Encode(message, out); });
+    const std::uint64_t offset = chunk_records_.size();
+    Encode(message, chunk_records_);
+    if (options_.message_indexes) {
+      chunk_message_indexes_[message.channel_id].entries.push_back({message.log_time, offset});
+    }
+    const auto [first, last] = chunk_message_count_ == 0
+                                   ? std::pair(message.log_time, message.log_time)
+                                   : std::minmax({chunk_start_, chunk_end_, message.log_time});
+    chunk_start_ = first;
+    chunk_end_ = last;
+    ++chunk_message_count_;
+    return chunk_records_.size() >= options_.chunk_bytes ? EndChunk() : Status();
+  }
+
+  Status Write(const Attachment& attachment) override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (const Status ended = EndChunk(); !ended.ok()) return ended;
+    scratch_.clear();
+    Encode(attachment, scratch_);
+    if (options_.attachment_indexes) {
+      attachment_indexes_.push_back({bytes_written_, scratch_.size(), attachment.log_time,
+                                     attachment.create_time, attachment.data.size(),
+                                     attachment.name, attachment.media_type});
+    }
+    ++statistics_.attachment_count;
+    return Put(scratch_);
+  }
+
+  Status Write(const Metadata& metadata) override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (const Status size = CheckLength(SizeOf(metadata.metadata), "metadata"); !size.ok()) {
+      return size;
+    }
+    if (const Status ended = EndChunk(); !ended.ok()) return ended;
+    scratch_.clear();
+    Encode(metadata, scratch_);
+    if (options_.metadata_indexes) {
+      metadata_indexes_.push_back({bytes_written_, scratch_.size(), metadata.name});
+    }
+    ++statistics_.metadata_count;
+    return Put(scratch_);
+  }
+
+  Status Flush() override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (const Status ended = EndChunk(); !ended.ok()) return ended;
+    return Sync();
+  }
+
+  Status Close() override {
+    if (const Status ready = CheckReady(); !ready.ok()) return ready;
+    if (const Status ended = EndChunk(); !ended.ok()) return ended;
+    scratch_.clear();
+    Encode(DataEnd{options_.data_crc ? data_crc_ : 0}, scratch_);
+    if (const Status put = Put(scratch_); !put.ok()) return put;
+    if (const Status put = PutSummary(); !put.ok()) return put;
+    closed_ = true;
+    return Sync();
+  }
+
+  std::uint64_t bytes_written() const override { return bytes_written_; }
+  const Statistics& statistics() const override { return statistics_; }
+
+ private:
+  Status CheckReady() const {
+    if (failed_) return *failed_;
+    if (closed_) return FailedPrecondition("the recording is closed");
+    return {};
+  }
+
+  Status Put(ByteView bytes) {
+    Status written = sink_.Write(bytes);
+    if (!written.ok()) {
+      failed_ = written.error();
+      return written;
+    }
+    if (options_.data_crc && !data_ended_) data_crc_ = Crc32(data_crc_, bytes);
+    bytes_written_ += bytes.size();
+    return {};
+  }
+
+  Status Sync() {
+    Status synced = sink_.Sync();
+    if (!synced.ok()) failed_ = synced.error();
+    return synced;
+  }
+
+  /// A record of the data section: into the open chunk, or straight out.
+  template <class EncodeRecord>
+  Status PutInData(const EncodeRecord& encode) {
+    if (options_.chunks) {
+      encode(chunk_records_);
+      return {};
+    }
+    scratch_.clear();
+    encode(scratch_);
+    return Put(scratch_);
+  }
+
+  void CountMessage(const MessageView& message) {
+    const bool first = statistics_.message_count++ == 0;
+    statistics_.message_start_time =
+        first ? message.log_time : std::min(statistics_.message_start_time, message.log_time);
+    statistics_.message_end_time =
+        first ? message.log_time : std::max(statistics_.message_end_time, message.log_time);
+    ++statistics_.channel_message_counts[message.channel_id];
+  }
+
+  Status EndChunk() {
+    if (chunk_records_.empty()) return {};
+    Chunk chunk;
+    if (chunk_message_count_ > 0) {
+      chunk.message_start_time = chunk_start_;
+      chunk.message_end_time = chunk_end_;
+    }
+    chunk.uncompressed_size = chunk_records_.size();
+    if (options_.chunk_crc) chunk.uncompressed_crc = Crc32(0, chunk_records_);
+    chunk.compression = NameOf(options_.compression);
+    ByteView records = chunk_records_;
+    if (options_.compression != Compression::kNone) {
+      const Status compressed =
+          Compress(options_.compression, options_.zstd_level, chunk_records_, compressed_);
+      if (!compressed.ok()) {
+        failed_ = compressed.error();
+        return compressed;
+      }
+      records = compressed_;
+    }
+    // One write for the whole, so that a failing one leaves no part of a chunk.
+    scratch_.clear();
+    scratch_.reserve(kRecordPrefix + kChunkPrefix + 8 + records.size());
+    EncodeChunkPrefix(chunk, records.size(), scratch_);
+    scratch_.insert(scratch_.end(), records.begin(), records.end());
+    ChunkIndex index;
+    index.message_start_time = chunk.message_start_time;
+    index.message_end_time = chunk.message_end_time;
+    index.chunk_start_offset = bytes_written_;
+    index.chunk_length = scratch_.size();
+    index.compression = chunk.compression;
+    index.compressed_size = records.size();
+    index.uncompressed_size = chunk.uncompressed_size;
+    for (auto& [channel_id, message_index] : chunk_message_indexes_) {
+      if (message_index.entries.empty()) continue;
+      message_index.channel_id = channel_id;
+      index.message_index_offsets[channel_id] = bytes_written_ + scratch_.size();
+      Encode(message_index, scratch_);
+      message_index.entries.clear();
+    }
+    index.message_index_length = scratch_.size() - index.chunk_length;
+    if (const Status put = Put(scratch_); !put.ok()) return put;
+    if (options_.chunk_indexes) Encode(index, chunk_index_records_);
+    ++statistics_.chunk_count;
+    chunk_records_.clear();
+    chunk_message_count_ = 0;
+    return {};
+  }
+
+  Status PutSummary() {
+    data_ended_ = true;
+    const std::uint64_t start = bytes_written_;
+    Bytes summary;
+    std::vector<SummaryOffset> groups;
+    const auto group = [&](Opcode opcode, const auto& encode) {
+      const std::size_t before = summary.size();
+      encode();
+      if (summary.size() > before) {
+        groups.push_back(
+            {static_cast<std::uint8_t>(opcode), start + before, summary.size() - before});
+      }
+    };
+    group(Opcode::kSchema, [&] {
+      if (!options_.repeated_schemas) return;
+      for (const auto& [id, schema] : schemas_) Encode(schema, summary);
+    });
+    group(Opcode::kChannel, [&] {
+      if (!options_.repeated_channels) return;
+      for (const auto& [id, channel] : channels_) Encode(channel, summary);
+    });
+    group(Opcode::kStatistics, [&] {
+      if (options_.statistics) Encode(statistics_, summary);
+    });
+    group(Opcode::kChunkIndex, [&] {
+      summary.insert(summary.end(), chunk_index_records_.begin(), chunk_index_records_.end());
+    });
+    group(Opcode::kAttachmentIndex, [&] {
+      for (const AttachmentIndex& index : attachment_indexes_) Encode(index, summary);
+    });
+    group(Opcode::kMetadataIndex, [&] {
+      for (const MetadataIndex& index : metadata_indexes_) Encode(index, summary);
+    });
+    Footer footer;
+    if (!groups.empty()) footer.summary_start = start;
+    if (options_.summary_offsets && !groups.empty()) {
+      footer.summary_offset_start = start + summary.size();
+      for (const SummaryOffset& offset : groups) Encode(offset, summary);
+    }
+    // The CRC covers the footer up to the CRC itself.
+    Encode(footer, summary);
+    if (options_.summary_crc) {
+      footer.summary_crc = Crc32(0, ByteView(summary).first(summary.size() - 4));
+      summary.resize(summary.size() - kFooterSize);
+      Encode(footer, summary);
+    }
+    summary.insert(summary.end(), std::begin(kMagic), std::end(kMagic));
+    return Put(summary);
+  }
+
+  ByteSink& sink_;
+  WriterOptions options_;
+  std::optional<Error> failed_;
+  bool closed_ = false;
+  bool data_ended_ = false;
+  std::uint64_t bytes_written_ = 0;
+  std::uint32_t data_crc_ = 0;
+  Statistics statistics_;
+  std::map<std::uint16_t, Schema> schemas_;
+  std::map<std::uint16_t, Channel> channels_;
+  Bytes chunk_index_records_;
+  std::vector<AttachmentIndex> attachment_indexes_;
+  std::vector<MetadataIndex> metadata_indexes_;
+
+  Bytes chunk_records_;
+  std::map<std::uint16_t, MessageIndex> chunk_message_indexes_;
+  std::uint64_t chunk_message_count_ = 0;
+  Stamp chunk_start_;
+  Stamp chunk_end_;
+  Bytes compressed_;
+  Bytes scratch_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Writer>> Writer::Create(ByteSink& sink, WriterOptions options) {
+  if (options.chunk_bytes == 0) {
+    return InvalidArgument("chunk_bytes is 0, must be positive", "chunk_bytes");
+  }
+  if (options.zstd_level < 1 || options.zstd_level > 19) {
+    return InvalidArgument(
+        "zstd_level is " + std::to_string(options.zstd_level) + ", must lie between 1 and 19",
+        "zstd_level");
+  }
+  auto writer = std::make_unique<McapWriter>(sink, std::move(options));
+  if (const Status begun = writer->Begin(); !begun.ok()) return begun.error();
+  return std::unique_ptr<Writer>(std::move(writer));
+}
+
+}  // namespace exemplar::recording
