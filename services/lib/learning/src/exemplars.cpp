@@ -1,0 +1,192 @@
+#include "exemplars.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact.hpp"
+#include "exemplar/learning/objectivity.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+// An object that stays within this part of the tool's extent rests.
+constexpr double kRestingPart = 0.01;
+constexpr double kRestingAngle = 0.05;  // rad
+
+double ToolExtent(const UniformTrial& trial) {
+  if (trial.base_T_tool.empty()) return 1;
+  Eigen::Vector3d low = trial.base_T_tool[0].translation;
+  Eigen::Vector3d high = low;
+  for (const geometry::Pose& pose : trial.base_T_tool) {
+    low = low.cwiseMin(pose.translation);
+    high = high.cwiseMax(pose.translation);
+  }
+  return (high - low).norm();
+}
+
+bool Rests(const std::vector<geometry::Pose>& path, double extent) {
+  for (const geometry::Pose& pose : path) {
+    if ((pose.translation - path[0].translation).norm() > kRestingPart * extent) return false;
+    if (geometry::AngleBetween(pose.rotation, path[0].rotation) > kRestingAngle) return false;
+  }
+  return true;
+}
+
+geometry::Pose MeanPose(const std::vector<geometry::Pose>& path) {
+  geometry::Pose mean;
+  std::vector<Eigen::Quaterniond> rotations;
+  for (const geometry::Pose& pose : path) {
+    mean.translation += pose.translation / static_cast<double>(path.size());
+    rotations.push_back(pose.rotation);
+  }
+  mean.rotation = geometry::MeanRotation(rotations);
+  return mean;
+}
+
+// From a contact's onset an object is carried or pushed by the tool: the tool's reference is where
+// the object was at the onset. It moves on to the next contact's between the two.
+std::vector<geometry::Pose> HoldDuringContacts(const std::vector<geometry::Pose>& path,
+                                               const std::vector<ContactSpan>& contacts,
+                                               int object) {
+  std::vector<geometry::Pose> reference = path;
+  const ContactSpan* before = nullptr;
+  const int n = static_cast<int>(path.size());
+  for (const ContactSpan& contact : contacts) {
+    if (contact.object != object) continue;
+    const geometry::Pose& onset = path[static_cast<std::size_t>(contact.first)];
+    if (before != nullptr) {
+      const geometry::Pose& held = reference[static_cast<std::size_t>(before->last)];
+      const int gap = contact.first - before->last;
+      for (int i = before->last + 1; i < contact.first; ++i) {
+        const double s = static_cast<double>(i - before->last) / gap;
+        reference[static_cast<std::size_t>(i)] =
+            geometry::Interpolate(held, onset, s * s * (3 - 2 * s));
+      }
+    }
+    for (int i = contact.first; i < n; ++i) reference[static_cast<std::size_t>(i)] = onset;
+    before = &contact;
+  }
+  return reference;
+}
+
+// The object towards which the paths converge most, by the least ratio of variances.
+int ChooseTarget(const Exemplars& exemplars) {
+  if (exemplars.objects() <= 1 || !exemplars.has_tool || exemplars.size() < 2) {
+    return exemplars.objects() > 0 ? 0 : -1;
+  }
+  std::vector<Eigen::MatrixXd> base;
+  for (int j = 0; j < exemplars.size(); ++j) base.push_back(exemplars.BasePath(j));
+  int best = 0;
+  double best_gain = -1;
+  for (int o = 0; o < exemplars.objects(); ++o) {
+    std::vector<Eigen::MatrixXd> shifted;
+    for (int j = 0; j < exemplars.size(); ++j) shifted.push_back(exemplars.ShiftedPath(j, o));
+    const Objectivity objectivity = ComputeObjectivity(base, shifted, std::nullopt);
+    const double gain = (objectivity.absolute_variance - objectivity.object_variance).maxCoeff();
+    if (gain > best_gain) {
+      best_gain = gain;
+      best = o;
+    }
+  }
+  return best;
+}
+
+std::vector<int> JointColumns(const UniformTrial& trial, const std::vector<std::string>& names) {
+  std::vector<int> columns;
+  for (const std::string& name : names) {
+    const auto at = std::find(trial.joint_names.begin(), trial.joint_names.end(), name);
+    columns.push_back(static_cast<int>(at - trial.joint_names.begin()));
+  }
+  return columns;
+}
+
+}  // namespace
+
+Eigen::MatrixXd Exemplars::BasePath(int trial) const {
+  Eigen::MatrixXd path(frames, 3);
+  const std::vector<geometry::Pose>& poses = trials[static_cast<std::size_t>(trial)].tool;
+  for (int i = 0; i < frames; ++i) {
+    path.row(i) = poses[static_cast<std::size_t>(i)].translation.transpose();
+  }
+  return path;
+}
+
+Eigen::MatrixXd Exemplars::ShiftedPath(int trial, int object) const {
+  Eigen::MatrixXd path = BasePath(trial);
+  const ExemplarTrial& exemplar = trials[static_cast<std::size_t>(trial)];
+  for (int i = 0; i < frames; ++i) {
+    path.row(i) -= exemplar.ObjectAt(object, i).translation.transpose();
+  }
+  return path;
+}
+
+std::optional<int> Exemplars::FirstContact(int object) const {
+  for (const ContactSpan& contact : contacts) {
+    if (contact.object == object) return contact.first;
+  }
+  return std::nullopt;
+}
+
+Exemplars Exemplars::Without(int trial) const {
+  Exemplars others = *this;
+  others.trials.erase(others.trials.begin() + trial);
+  return others;
+}
+
+Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
+                         const demonstration::ToolKinematics* tool) {
+  const UniformTrial& first = alignment.trials.front().warped;
+  Exemplars exemplars;
+  exemplars.frames = static_cast<int>(alignment.time_s.size());
+  exemplars.object_names = first.object_names;
+  exemplars.object_has_orientation.assign(first.object_names.size(), true);
+  exemplars.joint_names =
+      tool != nullptr && !first.joint_names.empty() ? tool->joint_names() : first.joint_names;
+  exemplars.has_tool = !first.base_T_tool.empty();
+  for (const AlignedTrial& aligned : alignment.trials) {
+    const UniformTrial& warped = aligned.warped;
+    exemplars.has_orientation = exemplars.has_orientation && warped.has_orientation;
+    ExemplarTrial trial;
+    trial.tool = warped.base_T_tool;
+    trial.joints.resize(exemplars.frames, exemplars.joints());
+    const std::vector<int> columns = JointColumns(warped, exemplars.joint_names);
+    for (int k = 0; k < exemplars.joints(); ++k) {
+      trial.joints.col(k) = warped.joints.col(columns[static_cast<std::size_t>(k)]);
+    }
+    trial.hand = Eigen::Map<const Eigen::VectorXd>(
+        warped.hand_open.data(), static_cast<Eigen::Index>(warped.hand_open.size()));
+    trial.touch_n = warped.touch_n;
+    if (exemplars.has_tool) trial.situation.base_T_start = warped.base_T_tool.front();
+    const double extent = ToolExtent(warped);
+    for (std::size_t o = 0; o < exemplars.object_names.size(); ++o) {
+      const auto at =
+          static_cast<std::size_t>(std::find(warped.object_names.begin(), warped.object_names.end(),
+                                             exemplars.object_names[o]) -
+                                   warped.object_names.begin());
+      const std::vector<geometry::Pose>& path = warped.base_T_object[at];
+      if (!warped.object_has_orientation[at]) exemplars.object_has_orientation[o] = false;
+      const bool rests = Rests(path, extent);
+      trial.situation.base_T_object.push_back(rests ? MeanPose(path) : path.front());
+      trial.moving.push_back(rests ? std::vector<geometry::Pose>{} : path);
+    }
+    exemplars.trials.push_back(std::move(trial));
+  }
+  exemplars.target = ChooseTarget(exemplars);
+  for (int o = 0; o < exemplars.objects(); ++o) {
+    if (exemplars.object_names[static_cast<std::size_t>(o)] == target) exemplars.target = o;
+  }
+  exemplars.contacts = FindContacts(exemplars);
+  for (ExemplarTrial& trial : exemplars.trials) {
+    for (int o = 0; o < exemplars.objects(); ++o) {
+      std::vector<geometry::Pose>& path = trial.moving[static_cast<std::size_t>(o)];
+      if (path.empty()) continue;
+      const std::optional<int> contact = exemplars.FirstContact(o);
+      trial.situation.base_T_object[static_cast<std::size_t>(o)] =
+          contact.has_value() ? path[static_cast<std::size_t>(*contact)] : path.back();
+      path = HoldDuringContacts(path, exemplars.contacts, o);
+    }
+  }
+  return exemplars;
+}
+
+}  // namespace exemplar::learning

@@ -1,0 +1,79 @@
+#pragma once
+// Aligned trials as interpolation sees them: where things were (the adverb) and how it moved (the
+// verb).
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exemplar/demonstration/tool_kinematics.hpp"
+#include "exemplar/learning/aligned.hpp"
+
+namespace exemplar::learning {
+
+/// What a motion depends on. Base frame.
+struct Situation {
+  std::optional<geometry::Pose> base_T_start;  ///< tool at the first frame
+  bool start_has_orientation = true;
+  std::optional<Eigen::VectorXd> joint_start;  ///< as Exemplars::joint_names
+  std::vector<geometry::Pose> base_T_object;   ///< as Exemplars::object_names
+};
+
+/// One aligned trial. Paths have Exemplars::frames rows.
+struct ExemplarTrial {
+  Situation situation;               ///< object poses at first contact, or where they rested
+  std::vector<geometry::Pose> tool;  ///< base_T_tool, or empty
+  Eigen::MatrixXd joints;            ///< frames x joints (or frames x 0)
+  Eigen::VectorXd hand;              ///< frames, or empty
+  Eigen::VectorXd touch_n;           ///< frames, or empty
+  /// Poses over time of each object that moved, the reference frame of the tool at each frame;
+  /// empty for one that rested.
+  std::vector<std::vector<geometry::Pose>> moving;
+
+  const geometry::Pose& ObjectAt(int object, int frame) const {
+    const auto o = static_cast<std::size_t>(object);
+    return moving[o].empty() ? situation.base_T_object[o]
+                             : moving[o][static_cast<std::size_t>(frame)];
+  }
+};
+
+/// A stretch in which the tools met an object.
+struct ContactSpan {
+  int object = 0;
+  int first = 0;
+  int last = 0;
+  bool touch_measured = false;
+};
+
+struct Exemplars {
+  int frames = 0;
+  std::vector<std::string> object_names;
+  std::vector<bool> object_has_orientation;
+  int target = -1;  ///< index of the object that the skill is about; -1 without objects
+  bool has_tool = false;
+  bool has_orientation = true;
+  std::vector<std::string> joint_names;
+  std::vector<ExemplarTrial> trials;
+  std::vector<ContactSpan> contacts;
+
+  int size() const { return static_cast<int>(trials.size()); }
+  int objects() const { return static_cast<int>(object_names.size()); }
+  int joints() const { return static_cast<int>(joint_names.size()); }
+  /// Tool positions of a trial, frames x 3; in the base frame or relative to an object (shifted,
+  /// not turned).
+  Eigen::MatrixXd BasePath(int trial) const;
+  Eigen::MatrixXd ShiftedPath(int trial, int object) const;
+  /// The first contact with `object`, if any.
+  std::optional<int> FirstContact(int object) const;
+  Exemplars Without(int trial) const;
+};
+
+/// Gathers the warped streams. `target` empty: the object towards whose frame the paths converge
+/// most. `tool` orders the joints (all of the trials' without it). Precondition: alignment holds a
+/// trial; objects, joints and streams are the same in all (LearnSkill checks).
+Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
+                         const demonstration::ToolKinematics* tool);
+
+}  // namespace exemplar::learning

@@ -1,0 +1,366 @@
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "exemplar/learning/skill.hpp"
+#include "skill_data.hpp"
+
+// Doubles are written with enough digits to read back the same, and everything else follows from
+// the alignment and the choices in the report: a skill read back answers as the one written.
+
+namespace exemplar::learning {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kFormat = 1;
+
+// ---- values of other libraries ------------------------------------------------------------------
+
+json FromVector(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
+
+Eigen::VectorXd ToVector(const json& j) {
+  const auto values = j.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+json FromMatrix(const Eigen::MatrixXd& m) {
+  return {{"rows", m.rows()},
+          {"cols", m.cols()},
+          {"values", std::vector<double>(m.data(), m.data() + m.size())}};
+}
+
+Eigen::MatrixXd ToMatrix(const json& j) {
+  const auto rows = j.at("rows").get<Eigen::Index>();
+  const auto cols = j.at("cols").get<Eigen::Index>();
+  const auto values = j.at("values").get<std::vector<double>>();
+  if (rows < 0 || cols < 0 || static_cast<std::size_t>(rows * cols) != values.size()) {
+    throw json::other_error::create(501, "matrix size does not fit its values", &j);
+  }
+  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
+}
+
+json FromPose(const geometry::Pose& pose) {
+  const Eigen::Vector3d& p = pose.translation;
+  const Eigen::Quaterniond& q = pose.rotation;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+geometry::Pose ToPose(const json& j) {
+  const auto v = j.get<std::array<double, 7>>();
+  return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Quaterniond(v[6], v[3], v[4], v[5])};
+}
+
+json FromPoses(const std::vector<geometry::Pose>& poses) {
+  json flat = json::array();
+  for (const geometry::Pose& pose : poses) {
+    for (const json& value : FromPose(pose)) flat.push_back(value);
+  }
+  return flat;
+}
+
+std::vector<geometry::Pose> ToPoses(const json& j) {
+  const auto v = j.get<std::vector<double>>();
+  if (v.size() % 7 != 0) throw json::other_error::create(501, "poses need 7 values each", &j);
+  std::vector<geometry::Pose> poses;
+  for (std::size_t i = 0; i < v.size(); i += 7) {
+    poses.push_back({Eigen::Vector3d(v[i], v[i + 1], v[i + 2]),
+                     Eigen::Quaterniond(v[i + 6], v[i + 3], v[i + 4], v[i + 5])});
+  }
+  return poses;
+}
+
+// ---- alignment ----------------------------------------------------------------------------------
+
+json FromUniform(const UniformTrial& trial) {
+  json objects = json::array();
+  for (std::size_t o = 0; o < trial.object_names.size(); ++o) {
+    objects.push_back({{"name", trial.object_names[o]},
+                       {"poses", FromPoses(trial.base_T_object[o])},
+                       {"has_orientation", static_cast<bool>(trial.object_has_orientation[o])}});
+  }
+  return {{"id", trial.id},
+          {"time_s", trial.time_s},
+          {"joint_names", trial.joint_names},
+          {"joints", FromMatrix(trial.joints)},
+          {"base_T_tool", FromPoses(trial.base_T_tool)},
+          {"has_orientation", trial.has_orientation},
+          {"hand_open", trial.hand_open},
+          {"touch_n", FromVector(trial.touch_n)},
+          {"objects", std::move(objects)},
+          {"cutoff_hz", trial.cutoff_hz},
+          {"notes", trial.notes}};
+}
+
+UniformTrial ToUniform(const json& j) {
+  UniformTrial trial;
+  trial.id = j.at("id").get<std::string>();
+  trial.time_s = j.at("time_s").get<std::vector<double>>();
+  trial.joint_names = j.at("joint_names").get<std::vector<std::string>>();
+  trial.joints = ToMatrix(j.at("joints"));
+  trial.base_T_tool = ToPoses(j.at("base_T_tool"));
+  trial.has_orientation = j.at("has_orientation").get<bool>();
+  trial.hand_open = j.at("hand_open").get<std::vector<double>>();
+  trial.touch_n = ToVector(j.at("touch_n"));
+  for (const json& object : j.at("objects")) {
+    trial.object_names.push_back(object.at("name").get<std::string>());
+    trial.base_T_object.push_back(ToPoses(object.at("poses")));
+    trial.object_has_orientation.push_back(object.at("has_orientation").get<bool>());
+  }
+  trial.cutoff_hz = j.at("cutoff_hz").get<double>();
+  trial.notes = j.at("notes").get<std::vector<std::string>>();
+  return trial;
+}
+
+json FromSegmentation(const Segmentation& segmentation) {
+  json markers = json::array();
+  for (const Marker& marker : segmentation.markers) {
+    markers.push_back({{"time_s", marker.time_s},
+                       {"frame", marker.frame},
+                       {"beginning", marker.kind == MarkerKind::kBeginning},
+                       {"cause", marker.cause},
+                       {"score", marker.score}});
+  }
+  return {{"msv", FromVector(segmentation.msv)},
+          {"touch_term", FromVector(segmentation.touch_term)},
+          {"c", segmentation.c},
+          {"k", segmentation.k},
+          {"c_tactile", segmentation.c_tactile},
+          {"c_replaced", segmentation.c_replaced},
+          {"markers", std::move(markers)}};
+}
+
+Segmentation ToSegmentation(const json& j) {
+  Segmentation segmentation;
+  segmentation.msv = ToVector(j.at("msv"));
+  segmentation.touch_term = ToVector(j.at("touch_term"));
+  segmentation.c = j.at("c").get<double>();
+  segmentation.k = j.at("k").get<double>();
+  segmentation.c_tactile = j.at("c_tactile").get<double>();
+  segmentation.c_replaced = j.at("c_replaced").get<bool>();
+  for (const json& marker : j.at("markers")) {
+    segmentation.markers.push_back(
+        {.time_s = marker.at("time_s").get<double>(),
+         .frame = marker.at("frame").get<int>(),
+         .kind = marker.at("beginning").get<bool>() ? MarkerKind::kBeginning : MarkerKind::kEnding,
+         .cause = marker.at("cause").get<std::string>(),
+         .score = marker.at("score").get<double>()});
+  }
+  return segmentation;
+}
+
+json FromAlignment(const Alignment& alignment) {
+  json trials = json::array();
+  for (const AlignedTrial& trial : alignment.trials) {
+    trials.push_back({{"id", trial.id},
+                      {"own", FromUniform(trial.own)},
+                      {"segmentation", FromSegmentation(trial.segmentation)},
+                      {"chosen", trial.chosen},
+                      {"own_knots_s", trial.own_knots_s},
+                      {"warped", FromUniform(trial.warped)}});
+  }
+  return {{"time_s", alignment.time_s},
+          {"knots_s", alignment.knots_s},
+          {"trials", std::move(trials)},
+          {"canonical_joints", FromMatrix(alignment.canonical_joints)},
+          {"canonical_tool", FromMatrix(alignment.canonical_tool)},
+          {"mean_correlation", alignment.mean_correlation},
+          {"plain_correlation", alignment.plain_correlation},
+          {"warnings", alignment.warnings}};
+}
+
+Alignment ToAlignment(const json& j) {
+  Alignment alignment;
+  alignment.time_s = j.at("time_s").get<std::vector<double>>();
+  alignment.knots_s = j.at("knots_s").get<std::vector<double>>();
+  for (const json& trial : j.at("trials")) {
+    alignment.trials.push_back({.id = trial.at("id").get<std::string>(),
+                                .own = ToUniform(trial.at("own")),
+                                .segmentation = ToSegmentation(trial.at("segmentation")),
+                                .chosen = trial.at("chosen").get<std::vector<int>>(),
+                                .own_knots_s = trial.at("own_knots_s").get<std::vector<double>>(),
+                                .warped = ToUniform(trial.at("warped"))});
+  }
+  alignment.canonical_joints = ToMatrix(j.at("canonical_joints"));
+  alignment.canonical_tool = ToMatrix(j.at("canonical_tool"));
+  alignment.mean_correlation = j.at("mean_correlation").get<double>();
+  alignment.plain_correlation = j.at("plain_correlation").get<double>();
+  alignment.warnings = j.at("warnings").get<std::vector<std::string>>();
+  return alignment;
+}
+
+// ---- report -------------------------------------------------------------------------------------
+
+json FromPart(const SkillReport::TrialPart& part) {
+  return {{"id", part.id},
+          {"source", part.source},
+          {"duration_s", part.duration_s},
+          {"candidates", part.candidates},
+          {"markers_s", part.markers_s},
+          {"c", part.c},
+          {"k", part.k},
+          {"cutoff_hz", part.cutoff_hz},
+          {"base_T_target", FromPose(part.base_T_target)},
+          {"notes", part.notes}};
+}
+
+SkillReport::TrialPart ToPart(const json& j) {
+  return {.id = j.at("id").get<std::string>(),
+          .source = j.at("source").get<std::string>(),
+          .duration_s = j.at("duration_s").get<double>(),
+          .candidates = j.at("candidates").get<int>(),
+          .markers_s = j.at("markers_s").get<std::vector<double>>(),
+          .c = j.at("c").get<double>(),
+          .k = j.at("k").get<double>(),
+          .cutoff_hz = j.at("cutoff_hz").get<double>(),
+          .base_T_target = ToPose(j.at("base_T_target")),
+          .notes = j.at("notes").get<std::vector<std::string>>()};
+}
+
+json FromScore(const MethodScore& score) {
+  return {{"method", score.method},
+          {"frechet_m", score.frechet_m},
+          {"end_error_m", score.end_error_m},
+          {"frechet_by_trial_m", score.frechet_by_trial_m},
+          {"chosen", score.chosen}};
+}
+
+MethodScore ToScore(const json& j) {
+  return {.method = j.at("method").get<std::string>(),
+          .frechet_m = j.at("frechet_m").get<double>(),
+          .end_error_m = j.at("end_error_m").get<double>(),
+          .frechet_by_trial_m = j.at("frechet_by_trial_m").get<std::vector<double>>(),
+          .chosen = j.at("chosen").get<bool>()};
+}
+
+json FromOptional(const std::optional<double>& value) {
+  return value.has_value() ? json(*value) : json(nullptr);
+}
+
+std::optional<double> ToOptional(const json& j) {
+  return j.is_null() ? std::nullopt : std::optional<double>(j.get<double>());
+}
+
+SkillReport ToReport(const json& j) {
+  SkillReport report;
+  report.skill = j.at("skill").get<std::string>();
+  report.version = j.at("version").get<int>();
+  report.method = j.at("method").get<std::string>();
+  report.target = j.at("target").get<std::string>();
+  report.options = j.at("options").get<std::map<std::string, std::string>>();
+  report.frames = j.at("frames").get<int>();
+  report.duration_s = j.at("duration_s").get<double>();
+  report.joint_names = j.at("joint_names").get<std::vector<std::string>>();
+  for (const json& trial : j.at("trials")) report.trials.push_back(ToPart(trial));
+  report.markers_s = j.at("markers_s").get<std::vector<double>>();
+  report.contact_begin_s = ToOptional(j.at("contact_begin_s"));
+  report.contact_end_s = ToOptional(j.at("contact_end_s"));
+  const auto contact = j.at("target_p_contact").get<std::array<double, 3>>();
+  report.target_p_contact = Eigen::Vector3d(contact[0], contact[1], contact[2]);
+  report.contact_spread_m = j.at("contact_spread_m").get<double>();
+  report.mean_correlation = j.at("mean_correlation").get<double>();
+  report.plain_correlation = j.at("plain_correlation").get<double>();
+  for (const json& score : j.at("methods")) report.methods.push_back(ToScore(score));
+  report.warnings = j.at("warnings").get<std::vector<std::string>>();
+  return report;
+}
+
+Status CheckShapes(const Alignment& alignment) {
+  if (alignment.trials.empty() || alignment.time_s.size() < 2) {
+    return Error{ErrorCode::kDataLoss, "skill JSON: alignment holds no motion", "alignment"};
+  }
+  const std::size_t frames = alignment.time_s.size();
+  const UniformTrial& first = alignment.trials.front().warped;
+  for (const AlignedTrial& trial : alignment.trials) {
+    const UniformTrial& warped = trial.warped;
+    bool good =
+        warped.time_s.size() == frames && warped.joint_names == first.joint_names &&
+        warped.object_names == first.object_names &&
+        warped.base_T_tool.size() == first.base_T_tool.size() &&
+        warped.hand_open.size() == first.hand_open.size() &&
+        (warped.base_T_tool.empty() || warped.base_T_tool.size() == frames) &&
+        (warped.hand_open.empty() || warped.hand_open.size() == frames) &&
+        warped.joints.cols() == static_cast<Eigen::Index>(warped.joint_names.size()) &&
+        (warped.joint_names.empty() || warped.joints.rows() == static_cast<Eigen::Index>(frames)) &&
+        (warped.touch_n.size() == 0 || warped.touch_n.size() == static_cast<Eigen::Index>(frames));
+    for (const std::vector<geometry::Pose>& path : warped.base_T_object) {
+      good = good && path.size() == frames;
+    }
+    if (!good) {
+      return Error{ErrorCode::kDataLoss,
+                   "skill JSON: trial \"" + trial.id + "\" does not fit the others", "alignment"};
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+json ToJson(const SkillReport& report) {
+  json trials = json::array();
+  for (const SkillReport::TrialPart& part : report.trials) trials.push_back(FromPart(part));
+  json methods = json::array();
+  for (const MethodScore& score : report.methods) methods.push_back(FromScore(score));
+  const Eigen::Vector3d& contact = report.target_p_contact;
+  return {{"skill", report.skill},
+          {"version", report.version},
+          {"method", report.method},
+          {"target", report.target},
+          {"options", report.options},
+          {"frames", report.frames},
+          {"duration_s", report.duration_s},
+          {"joint_names", report.joint_names},
+          {"trials", std::move(trials)},
+          {"markers_s", report.markers_s},
+          {"contact_begin_s", FromOptional(report.contact_begin_s)},
+          {"contact_end_s", FromOptional(report.contact_end_s)},
+          {"target_p_contact", {contact.x(), contact.y(), contact.z()}},
+          {"contact_spread_m", report.contact_spread_m},
+          {"mean_correlation", report.mean_correlation},
+          {"plain_correlation", report.plain_correlation},
+          {"methods", std::move(methods)},
+          {"warnings", report.warnings}};
+}
+
+json ToJson(const Skill& skill) {
+  return {{"format", kFormat},
+          {"report", ToJson(skill.report())},
+          {"alignment", FromAlignment(skill.alignment())},
+          {"model", skill.data().choices}};
+}
+
+Result<Skill> SkillFromJson(const json& stored,
+                            std::shared_ptr<const demonstration::ToolKinematics> tool) {
+  try {
+    if (const int format = stored.at("format").get<int>(); format != kFormat) {
+      return Error{ErrorCode::kDataLoss,
+                   "skill JSON: format is " + std::to_string(format) + ", this program reads " +
+                       std::to_string(kFormat),
+                   "format"};
+    }
+    SkillReport report = ToReport(stored.at("report"));
+    auto alignment = std::make_shared<const Alignment>(ToAlignment(stored.at("alignment")));
+    if (const Status good = CheckShapes(*alignment); !good.ok()) return good.error();
+    const UniformTrial& first = alignment->trials.front().warped;
+    if (tool != nullptr && !first.joint_names.empty()) {
+      for (const std::string& name : tool->joint_names()) {
+        if (std::find(first.joint_names.begin(), first.joint_names.end(), name) ==
+            first.joint_names.end()) {
+          return FailedPrecondition("the robot model's joint \"" + name +
+                                    "\" is not among the skill's");
+        }
+      }
+    }
+    auto choices = stored.at("model").get<std::string>();
+    std::shared_ptr<Skill::Data> data =
+        MakeSkillData(std::move(report), std::move(alignment), std::move(tool));
+    data->choices = std::move(choices);
+    data->model = FitModel(data->choices, *data->exemplars, data->tool);
+    return Skill(std::move(data));
+  } catch (const json::exception& e) {
+    return Error{ErrorCode::kDataLoss, std::string("skill JSON: ") + e.what(), "skill"};
+  }
+}
+
+}  // namespace exemplar::learning
