@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "exemplar/base/rng.hpp"
 #include "exemplar/base/text.hpp"
@@ -39,7 +40,13 @@ struct Evaluation {
 class Solver {
  public:
   Solver(const Chain& chain, const geometry::Pose& goal, const IkOptions& options)
-      : chain_(chain), goal_(goal), options_(options), n_(chain.dof()), step_(n_), fixed_(n_) {
+      : chain_(chain),
+        goal_(goal),
+        options_(options),
+        n_(chain.dof()),
+        step_(n_),
+        ease_(n_),
+        fixed_(n_) {
     for (Evaluation* e : {&now_, &next_, &best_}) {
       e->q.resize(n_);
       e->jacobian.resize(6, n_);
@@ -51,6 +58,8 @@ class Solver {
       lower_[i] = chain.limits()[i].lower;
       upper_[i] = chain.limits()[i].upper;
     }
+    ease_ = Eigen::VectorXd::Ones(n_);
+    if (options.preferred_weights.size() == n_) ease_ = options.preferred_weights.cwiseInverse();
   }
 
   Result<IkSolution> Solve(const Eigen::Ref<const Eigen::VectorXd>& seed) {
@@ -123,7 +132,8 @@ class Solver {
         if (fixed_[i]) {
           rest -= step_[i] * column;
         } else {
-          normal.noalias() += column * column.transpose();
+          const double ease = pull != nullptr ? ease_[i] : 1.0;
+          normal.noalias() += ease * (column * column.transpose());
           if (pull != nullptr) rest -= (*pull)[i] * column;
         }
       }
@@ -131,7 +141,8 @@ class Solver {
       bool crossed = false;
       for (int i = 0; i < n_; ++i) {
         if (fixed_[i]) continue;
-        step_[i] = e.jacobian.col(i).dot(multipliers) + (pull != nullptr ? (*pull)[i] : 0.0);
+        step_[i] = e.jacobian.col(i).dot(multipliers);
+        if (pull != nullptr) step_[i] = ease_[i] * step_[i] + (*pull)[i];
         const double bounded = std::clamp(e.q[i] + step_[i], lower_[i], upper_[i]) - e.q[i];
         if (bounded == step_[i]) continue;
         if (std::abs(bounded - step_[i]) < 1e-14) {
@@ -203,11 +214,16 @@ class Solver {
     return Met(now_);
   }
 
-  /// Moves best_, which meets the pose, along the null space to the least distance to `preferred`.
+  double Cost(const Eigen::VectorXd& away) const {
+    return (away.array().square() / ease_.array()).sum();
+  }
+
+  /// Moves best_, which meets the pose, along the null space to the least weighted distance to
+  /// `preferred`: Newton's steps for the tangent problem, each brought back onto the pose.
   void ApproachPreferred(int& iterations) {
     const Eigen::VectorXd goal = options_.preferred.cwiseMax(lower_).cwiseMin(upper_);
     double longest = kNullSpaceStep;
-    double distance = (best_.q - goal).squaredNorm();
+    double distance = Cost(best_.q - goal);
     for (int i = 0; i < kNullSpaceIterations && longest > 1e-5; ++i) {
       ++iterations;
       const Eigen::VectorXd pull = goal - best_.q;
@@ -216,7 +232,7 @@ class Solver {
       if (largest < 1e-7) return;
       TakeStep(best_, std::min(1.0, longest / largest), now_);
       if (Restore(iterations)) {
-        const double reached = (now_.q - goal).squaredNorm();
+        const double reached = Cost(now_.q - goal);
         if (reached < distance) {
           const bool settled = distance - reached < 1e-13;
           distance = reached;
@@ -251,6 +267,7 @@ class Solver {
   const IkOptions& options_;
   const int n_;
   Eigen::VectorXd lower_, upper_, step_;
+  Eigen::VectorXd ease_;  ///< inverse weights
   Eigen::Array<bool, Eigen::Dynamic, 1> fixed_;
   Evaluation now_, next_, best_;
 };

@@ -17,6 +17,8 @@ struct IkOptions {
   /// The posture (dof values) to come as near to as the pose allows, by least squares along the
   /// null space; empty: none.
   Eigen::VectorXd preferred = {};
+  /// What a squared radian (or metre) of each joint off `preferred` costs, positive; empty: 1 each.
+  Eigen::VectorXd preferred_weights = {};
   int max_iterations = 100;  ///< of one descent; one that makes no headway ends sooner
   int max_restarts = 40;     ///< from random postures, after the seed
   std::uint64_t random_seed = 1;
