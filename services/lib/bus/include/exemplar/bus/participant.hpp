@@ -18,10 +18,10 @@ struct ParticipantOptions {
   std::string station = "default";  ///< the partition of all its topics
   std::string name = "exemplar";    ///< as discovery tools show it
   /// Addresses or names ("127.0.0.1", "eth1") of the interfaces to use; empty: all.
-  std::vector<std::string> interfaces;
+  std::vector<std::string> interfaces = {};
   /// IPv4 addresses where other participants are sought beside multicast. The own machine is always
   /// sought, so that a loopback interface without multicast will do.
-  std::vector<std::string> peers;
+  std::vector<std::string> peers = {};
   /// Shared memory for neighbours on the same machine, at most this much of it (less where
   /// /dev/shm is small); 0: UDP only. Holds a few stereo pairs.
   std::size_t shared_memory_bytes = std::size_t{16} << 20;
