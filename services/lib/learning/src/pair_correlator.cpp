@@ -1,0 +1,239 @@
+#include "pair_correlator.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "subsets.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+constexpr std::size_t kMemory = std::size_t{1} << 15;  // stretches remembered; a power of two
+constexpr double kConstant = 1e-12;  // variance of a warped signal of unit variance
+constexpr std::uint16_t kStart = 0xFFFF;
+constexpr std::uint16_t kEnd = 0xFFFE;
+
+std::uint64_t Mix(std::uint64_t hash, std::uint64_t value) {
+  hash = (hash ^ value) * 0x9E3779B97F4A7C15u;
+  return hash ^ (hash >> 29);
+}
+
+}  // namespace
+
+void PairCorrelator::Sums::Add(const Sums& other) {
+  a += other.a;
+  b += other.b;
+  aa += other.aa;
+  bb += other.bb;
+  ab += other.ab;
+}
+
+CorrelatedTrial::CorrelatedTrial(const MarkerCandidates& trial)
+    : time_s(trial.time_s),
+      duration_s(trial.duration_s),
+      samples_per_s(static_cast<double>(trial.signal.size() - 1) / trial.duration_s) {
+  const Eigen::Index n = trial.signal.size();
+  // Centred and scaled: r does not change, and the sums keep their digits.
+  Eigen::VectorXd signal = trial.signal.array() - trial.signal.mean();
+  const double deviation = std::sqrt(signal.squaredNorm() / static_cast<double>(n));
+  const bool constant = !(deviation > kConstant * trial.signal.cwiseAbs().maxCoeff());
+  signal *= constant ? 0 : 1 / deviation;
+  samples.resize(static_cast<std::size_t>(n));
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double slope = k + 1 < n ? signal[k + 1] - signal[k] : 0;
+    samples[static_cast<std::size_t>(k)] = {signal[k], slope};
+  }
+}
+
+PairCorrelator::PairCorrelator(const CorrelatedTrial& a, const CorrelatedTrial& b, int points,
+                               double pairs)
+    : points_(points), step_s_((a.duration_s + b.duration_s) / 2 / (points - 1)) {
+  a_.trial = &a;
+  b_.trial = &b;
+  const auto wanted = static_cast<std::size_t>(std::min(4 * pairs, 1.0 * kMemory));
+  memory_.resize(std::bit_ceil(std::max<std::size_t>(wanted, 16)));
+}
+
+void PairCorrelator::Restart(std::size_t size) {
+  const std::size_t knots = size + 2;
+  for (Side* side : {&a_, &b_}) {
+    side->own_s.assign(knots, 0);
+    side->slope.assign(knots, 0);
+    side->entering.assign(knots, 0);
+    side->tangent.assign(knots, 0);
+    side->name.assign(knots, kStart);
+  }
+  common_s_.assign(knots, 0);
+  upto_.assign(knots, {});
+}
+
+void PairCorrelator::Limit(Side& side, std::size_t stretch, double next_tangent) {
+  const double slope = side.slope[stretch];  // positive: markers are distinct
+  const double a = side.entering[stretch] / slope;
+  const double b = next_tangent / slope;
+  const double squared = a * a + b * b;
+  if (squared > 9) {
+    const double scale = 3 * slope / std::sqrt(squared);
+    side.tangent[stretch] = scale * a;
+    side.entering[stretch + 1] = scale * b;
+  } else {
+    side.tangent[stretch] = side.entering[stretch];
+    side.entering[stretch + 1] = next_tangent;
+  }
+}
+
+// A knot fixes the unlimited tangent of the one before, hence the limit of the second stretch
+// behind, hence both tangents of the third.
+void PairCorrelator::Push(std::size_t knot, double a_s, double b_s, std::uint16_t a_name,
+                          std::uint16_t b_name) {
+  a_.own_s[knot] = a_s;
+  b_.own_s[knot] = b_s;
+  a_.name[knot] = a_name;
+  b_.name[knot] = b_name;
+  common_s_[knot] = (a_s + b_s) / 2;
+  const double width = common_s_[knot] - common_s_[knot - 1];
+  for (Side* side : {&a_, &b_}) {
+    side->slope[knot - 1] = (side->own_s[knot] - side->own_s[knot - 1]) / width;
+    if (knot == 1) {
+      side->entering[0] = side->slope[0];
+    } else {
+      Limit(*side, knot - 2, (side->slope[knot - 2] + side->slope[knot - 1]) / 2);
+    }
+  }
+  upto_[knot] = upto_[knot - 1];
+  if (knot >= 3) upto_[knot].Add(Stretch(knot - 3));
+}
+
+void PairCorrelator::PushMarker(std::size_t knot, int a, int b) {
+  Push(knot, a_.trial->time_s[static_cast<std::size_t>(a)],
+       b_.trial->time_s[static_cast<std::size_t>(b)], static_cast<std::uint16_t>(a),
+       static_cast<std::uint16_t>(b));
+}
+
+double PairCorrelator::Finish(std::size_t size) {
+  const std::size_t end = size + 1;
+  Push(end, a_.trial->duration_s, b_.trial->duration_s, kEnd, kEnd);
+  for (Side* side : {&a_, &b_}) {
+    Limit(*side, end - 1, side->slope[end - 1]);
+    side->tangent[end] = side->entering[end];
+  }
+  Sums sums = upto_[end];
+  sums.Add(Stretch(end - 2));
+  sums.Add(Stretch(end - 1));
+  const double n = points_;
+  const double aa = sums.aa - sums.a * sums.a / n;
+  const double bb = sums.bb - sums.b * sums.b / n;
+  if (!(aa > kConstant * n) || !(bb > kConstant * n)) return 0;
+  return std::clamp((sums.ab - sums.a * sums.b / n) / std::sqrt(aa * bb), -1.0, 1.0);
+}
+
+PairCorrelator::Sums PairCorrelator::Stretch(std::size_t stretch) {
+  const Key key{
+      static_cast<std::uint64_t>(a_.name[stretch]) << 48 |
+          static_cast<std::uint64_t>(b_.name[stretch]) << 32 |
+          static_cast<std::uint64_t>(a_.name[stretch + 1]) << 16 |
+          static_cast<std::uint64_t>(b_.name[stretch + 1]),
+      {a_.tangent[stretch], a_.tangent[stretch + 1], b_.tangent[stretch], b_.tangent[stretch + 1]}};
+  std::uint64_t hash = Mix(0, key.knots);
+  for (const double tangent : key.tangents) hash = Mix(hash, std::bit_cast<std::uint64_t>(tangent));
+  Remembered& place = memory_[hash & (memory_.size() - 1)];
+  if (!place.used || !(place.key == key)) {
+    place = {key, Compute(stretch), true};
+    ++computed_;
+  }
+  return place.sums;
+}
+
+PairCorrelator::Sums PairCorrelator::Compute(std::size_t stretch) const {
+  const double from = common_s_[stretch];
+  const double width = common_s_[stretch + 1] - from;
+  const auto first = static_cast<int>(std::ceil(from / step_s_));
+  const bool last = stretch + 2 == common_s_.size();
+  const int behind = last ? points_ : static_cast<int>(std::ceil(common_s_[stretch + 1] / step_s_));
+  // The warp of either side as a cubic of the part of the stretch, in samples.
+  struct Cubic {
+    double c0, c1, c2, c3;
+    const CorrelatedTrial::Sample* samples;
+    int highest;
+    double At(double s) const {
+      const double place = c0 + s * (c1 + s * (c2 + s * c3));
+      const int at = std::clamp(static_cast<int>(place), 0, highest);
+      const CorrelatedTrial::Sample& sample = samples[at];
+      return sample.value + (place - at) * sample.slope;
+    }
+  };
+  const auto cubic = [&](const Side& side) {
+    const double scale = side.trial->samples_per_s;
+    const double y0 = side.own_s[stretch] * scale;
+    const double rise = side.own_s[stretch + 1] * scale - y0;
+    const double m0 = side.tangent[stretch] * width * scale;
+    const double m1 = side.tangent[stretch + 1] * width * scale;
+    return Cubic{y0,
+                 m0,
+                 3 * rise - 2 * m0 - m1,
+                 m0 + m1 - 2 * rise,
+                 side.trial->samples.data(),
+                 static_cast<int>(side.trial->samples.size()) - 2};
+  };
+  const Cubic a = cubic(a_);
+  const Cubic b = cubic(b_);
+  Sums sums;
+  for (int p = first; p < behind; ++p) {
+    const double s = (p * step_s_ - from) / width;
+    const double va = a.At(s);
+    const double vb = b.At(s);
+    sums.a += va;
+    sums.b += vb;
+    sums.aa += va * va;
+    sums.bb += vb * vb;
+    sums.ab += va * vb;
+  }
+  return sums;
+}
+
+double PairCorrelator::Correlate(std::span<const int> a_subset, std::span<const int> b_subset) {
+  Restart(a_subset.size());
+  for (std::size_t m = 0; m < a_subset.size(); ++m) PushMarker(m + 1, a_subset[m], b_subset[m]);
+  return Finish(a_subset.size());
+}
+
+struct PairCorrelator::Walk {
+  const std::vector<int>& a_kept;
+  const std::vector<int>& b_kept;
+  std::size_t size;
+  const Take& take;
+};
+
+void PairCorrelator::Descend(const Walk& walk, std::size_t knot, std::size_t a_from,
+                             std::size_t b_from, std::size_t a_rank, std::size_t b_rank) {
+  if (knot > walk.size) {
+    walk.take(a_rank, b_rank, Finish(walk.size));
+    return;
+  }
+  // So many markers still follow this one; so many subsets begin with the path up to here and it.
+  const std::size_t follow = walk.size - knot;
+  const auto subsets = [&](std::size_t all, std::size_t place) {
+    return static_cast<std::size_t>(Binomial(all - place - 1, follow));
+  };
+  const std::size_t na = walk.a_kept.size();
+  const std::size_t nb = walk.b_kept.size();
+  std::size_t a_at = a_rank;
+  for (std::size_t a = a_from; a + follow < na; ++a) {
+    std::size_t b_at = b_rank;
+    for (std::size_t b = b_from; b + follow < nb; ++b) {
+      PushMarker(knot, walk.a_kept[a], walk.b_kept[b]);
+      Descend(walk, knot + 1, a + 1, b + 1, a_at, b_at);
+      b_at += subsets(nb, b);
+    }
+    a_at += subsets(na, a);
+  }
+}
+
+void PairCorrelator::CorrelateAll(const std::vector<int>& a_kept, const std::vector<int>& b_kept,
+                                  std::size_t size, const Take& take) {
+  Restart(size);
+  Descend({a_kept, b_kept, size, take}, 1, 0, 0, 0, 0);
+}
+
+}  // namespace exemplar::learning
