@@ -1,0 +1,37 @@
+#include "exemplar/rpc/call_log.hpp"
+
+namespace exemplar::rpc {
+
+void CallLog::Record(const CallRecord& call) {
+  const std::string code(call.status ? "ok" : ToString(call.status.error().code));
+  const double seconds = ToSeconds(call.duration);
+  if (call.status) {
+    log_.Debug("call", {{"method", call.method},
+                        {"request_id", call.request_id},
+                        {"peer", call.peer},
+                        {"seconds", seconds}});
+  } else {
+    log_.Warning("call failed", {{"method", call.method},
+                                 {"request_id", call.request_id},
+                                 {"peer", call.peer},
+                                 {"seconds", seconds},
+                                 {"code", code},
+                                 {"field", call.status.error().field},
+                                 {"error", call.status.error().message}});
+  }
+  const std::lock_guard lock(mutex_);
+  Figure& figure = figures_[{std::string(call.method), code}];
+  figure.method = call.method;
+  figure.code = code;
+  ++figure.calls;
+  figure.seconds += seconds;
+}
+
+std::vector<CallLog::Figure> CallLog::figures() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<Figure> all;
+  for (const auto& [key, figure] : figures_) all.push_back(figure);
+  return all;
+}
+
+}  // namespace exemplar::rpc
