@@ -1,0 +1,266 @@
+#include "learning/skills.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "exemplar/base/text.hpp"
+
+namespace exemplar::learning_service {
+namespace {
+
+/// How the time of learning is shared out.
+constexpr double kLoaded = 0.1;
+constexpr double kLearned = 0.95;
+
+std::string Place(const std::string& name, int version) {
+  return "skill \"" + name + "\" version " + std::to_string(version);
+}
+
+std::string ToCbor(const learning::Skill& skill) {
+  std::string document;
+  nlohmann::json::to_cbor(learning::ToJson(skill), document);
+  return document;
+}
+
+std::vector<std::string> TrialIds(const learning::SkillReport& report) {
+  std::vector<std::string> ids;
+  for (const auto& trial : report.trials) ids.push_back(trial.id);
+  return ids;
+}
+
+}  // namespace
+
+class Skills::Claim {
+ public:
+  static Result<Claim> Take(Skills& skills, const std::string& name) {
+    const std::lock_guard lock(skills.claims_mutex_);
+    if (!skills.claims_.insert(name).second) {
+      return FailedPrecondition("skill \"" + name + "\" is being learned or changed already",
+                                "name");
+    }
+    return Claim(skills, name);
+  }
+  Claim(Claim&& other) noexcept
+      : skills_(std::exchange(other.skills_, nullptr)), name_(std::move(other.name_)) {}
+  Claim& operator=(Claim&&) = delete;
+  ~Claim() {
+    if (!skills_) return;
+    const std::lock_guard lock(skills_->claims_mutex_);
+    skills_->claims_.erase(name_);
+  }
+
+ private:
+  Claim(Skills& skills, std::string name) : skills_(&skills), name_(std::move(name)) {}
+  Skills* skills_;
+  std::string name_;
+};
+
+Skills::Skills(Store& store, Trials& trials, const Clock& clock,
+               std::shared_ptr<const demonstration::ToolKinematics> tool, Log& log)
+    : store_(store), trials_(trials), clock_(clock), tool_(std::move(tool)), log_(log) {
+  const Result<std::vector<api::SkillInfo>> all = store_.ListSkills();
+  if (!all) {
+    log_.Error("skills cannot be listed", {{"error", all.error().message}});
+    return;
+  }
+  for (const api::SkillInfo& info : *all) {
+    Result<learning::Skill> skill = FromStore(info.name, info.version);
+    if (skill) {
+      SetCurrent(info.name, *std::move(skill));
+    } else {
+      log_.Error("skill cannot be loaded",
+                 {{"skill", info.name}, {"error", skill.error().message}});
+    }
+  }
+}
+
+void Skills::SetCurrent(const std::string& name, learning::Skill skill) {
+  const std::unique_lock lock(current_mutex_);
+  current_.insert_or_assign(name, std::move(skill));
+}
+
+Result<learning::Skill> Skills::FromStore(const std::string& name, int version) {
+  const Result<std::optional<std::string>> document = store_.Document(name, version);
+  if (!document) return document.error();
+  if (!*document) return NotFound("there is no " + Place(name, version), "version");
+  const nlohmann::json json = nlohmann::json::from_cbor(**document, true, false);
+  if (json.is_discarded()) {
+    return Error{ErrorCode::kDataLoss, Place(name, version) + " is damaged in the store"};
+  }
+  Result<learning::Skill> skill = learning::SkillFromJson(json, tool_);
+  if (!skill) return WithPlace(skill.error(), Place(name, version));
+  return skill;
+}
+
+Result<learning::Skill> Skills::Find(const std::string& name, int version) {
+  {
+    const std::shared_lock lock(current_mutex_);
+    const auto found = current_.find(name);
+    if (found != current_.end() && (version == 0 || found->second.report().version == version)) {
+      return found->second;
+    }
+  }
+  const Result<std::vector<api::VersionInfo>> versions = store_.ListVersions(name);
+  if (!versions) return versions.error();
+  if (versions->empty()) return NoSuchSkill(name);
+  for (const api::VersionInfo& info : *versions) {
+    if (info.version == version || (version == 0 && info.current)) {
+      return FromStore(name, info.version);
+    }
+  }
+  return NotFound("skill \"" + name + "\" has no version " + std::to_string(version) +
+                      "; its last is " + std::to_string(versions->back().version),
+                  "version");
+}
+
+Error Skills::NoSuchSkill(const std::string& name) {
+  std::string message = "there is no skill \"" + name + "\"";
+  std::vector<std::string> names;
+  if (const Result<std::vector<api::SkillInfo>> all = store_.ListSkills(); all) {
+    for (const api::SkillInfo& info : *all) names.push_back(info.name);
+  }
+  if (const auto nearest = NearestName(name, names)) {
+    message += "; did you mean \"" + *nearest + "\"?";
+  }
+  return NotFound(std::move(message), "name");
+}
+
+Result<std::vector<learning::NamedTrial>> Skills::LoadTrials(const std::string& skill,
+                                                             const learning::LearnOptions& options,
+                                                             const learning::Progress& progress,
+                                                             std::stop_token stop) {
+  const Result<std::vector<api::TrialInfo>> infos = trials_.List(skill);
+  if (!infos) return infos.error();
+  if (infos->empty()) {
+    return NotFound("skill \"" + skill + "\" has no trials to learn from", "name");
+  }
+  for (const std::string& left_out : options.leave_out) {
+    const bool known = std::any_of(infos->begin(), infos->end(), [&](const auto& info) {
+      return info.id == left_out || info.source == left_out;
+    });
+    if (!known) {
+      return InvalidArgument(
+          "option leave_out: skill \"" + skill + "\" has no trial \"" + left_out + "\"",
+          "options.leave_out");
+    }
+  }
+  std::vector<learning::NamedTrial> trials;
+  for (std::size_t i = 0; i < infos->size(); ++i) {
+    if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "learning was cancelled"};
+    const double fraction = static_cast<double>(i) / static_cast<double>(infos->size());
+    if (progress) progress(kLoaded * fraction, "reading the trials");
+    Result<demonstration::Trial> trial = trials_.Load((*infos)[i].id);
+    if (!trial) return WithPlace(trial.error(), "trial " + (*infos)[i].id);
+    trials.push_back({(*infos)[i].id, *std::move(trial)});
+  }
+  return trials;
+}
+
+Result<learning::SkillReport> Skills::Learn(const std::string& name,
+                                            const std::map<std::string, std::string>& options,
+                                            const learning::Progress& progress,
+                                            std::stop_token stop) {
+  if (const Status valid = CheckSkillName(name, "name"); !valid) return valid.error();
+  const Result<learning::LearnOptions> read = learning::LearnOptions::FromStrings(options);
+  if (!read) {
+    Error error = read.error();
+    error.field = "options." + error.field;
+    return error;
+  }
+  const Result<Claim> claim = Claim::Take(*this, name);
+  if (!claim) return claim.error();
+  const Result<std::vector<learning::NamedTrial>> trials = LoadTrials(name, *read, progress, stop);
+  if (!trials) return trials.error();
+  const Result<learning::Skill> learned = learning::LearnSkill(
+      *trials, *read, tool_,
+      [&](double fraction, std::string_view step) {
+        if (progress) progress(kLoaded + (kLearned - kLoaded) * fraction, step);
+      },
+      stop);
+  if (!learned) return learned.error();
+
+  if (progress) progress(kLearned, "storing the skill");
+  const Result<int> version = store_.NextVersion(name);
+  if (!version) return version.error();
+  const learning::Skill skill = learned->Named(name, *version);
+  const learning::SkillReport& report = skill.report();
+  const StoredVersion stored{.skill = name,
+                             .info = {.version = *version,
+                                      .current = true,
+                                      .method = report.method,
+                                      .trial_ids = TrialIds(report),
+                                      .learned = clock_.Now()},
+                             .target = report.target,
+                             .options = report.options,
+                             .document = ToCbor(skill)};
+  // The last chance to turn back: from here on the version is there.
+  if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "learning was cancelled"};
+  if (const Status added = store_.AddVersion(stored); !added) return added.error();
+  SetCurrent(name, skill);
+  return report;
+}
+
+Result<std::vector<api::SkillInfo>> Skills::List() { return store_.ListSkills(); }
+
+Result<learning::SkillReport> Skills::Show(const std::string& name, int version) {
+  const Result<learning::Skill> skill = Find(name, version);
+  if (!skill) return skill.error();
+  return skill->report();
+}
+
+Result<std::vector<api::VersionInfo>> Skills::Versions(const std::string& name) {
+  Result<std::vector<api::VersionInfo>> versions = store_.ListVersions(name);
+  if (versions && versions->empty()) return NoSuchSkill(name);
+  return versions;
+}
+
+Status Skills::Rollback(const std::string& name, int version) {
+  if (version < 1) {
+    return InvalidArgument("version is " + std::to_string(version) + ", must be at least 1",
+                           "version");
+  }
+  const Result<Claim> claim = Claim::Take(*this, name);
+  if (!claim) return claim.error();
+  Result<learning::Skill> skill = Find(name, version);
+  if (!skill) return skill.error();
+  if (Status stored = store_.SetCurrent(name, version); !stored) return stored;
+  SetCurrent(name, *std::move(skill));
+  return {};
+}
+
+Status Skills::Delete(const std::string& name) {
+  const Result<Claim> claim = Claim::Take(*this, name);
+  if (!claim) return claim.error();
+  const Result<bool> deleted = store_.DeleteSkill(name);
+  if (!deleted) return deleted.error();
+  if (!*deleted) return NoSuchSkill(name);
+  const std::unique_lock lock(current_mutex_);
+  current_.erase(name);
+  return {};
+}
+
+Result<demonstration::SkillMotion> Skills::Query(const std::string& name, int version,
+                                                 const demonstration::SkillQuery& query) {
+  const Result<learning::Skill> skill = Find(name, version);
+  if (!skill) return skill.error();
+  return learning::Answer(*skill, query);
+}
+
+Result<learning::Evaluation> Skills::Evaluate(const std::string& name, int version,
+                                              const std::string& file_name, std::string file) {
+  const Result<learning::Skill> skill = Find(name, version);
+  if (!skill) return skill.error();
+  const Result<demonstration::Trial> trial = trials_.Read(file_name, file);
+  if (!trial) return trial.error();
+  return learning::Evaluate(*skill, *trial);
+}
+
+Result<std::string> Skills::ExportJson(const std::string& name, int version) {
+  const Result<learning::Skill> skill = Find(name, version);
+  if (!skill) return skill.error();
+  return learning::ToJson(*skill).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
+         "\n";
+}
+
+}  // namespace exemplar::learning_service
