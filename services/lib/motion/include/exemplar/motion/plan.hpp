@@ -38,8 +38,16 @@ struct PlanOptions {
   double required_clearance_m = 2e-3;
   double speed_scale = 1.0;  ///< 1: the demonstrated timing where limits allow
   double approach_velocity =
-      0.5;                 ///< fraction of joint velocity limits on the way to the first frame
-  std::string touch_link;  ///< link that may touch the target in a contact; empty: the tip link
+      0.5;  ///< fraction of joint velocity limits on the way to the first frame
+  /// Links that may touch the target of a contact, from `touch_margin_m` of tool path before the
+  /// contact to as much after it; empty: the tip link.
+  std::vector<std::string> touch_links = {};
+  double touch_margin_m = 0.03;
+  /// What joints tend to where the skill has no joints of the chain (n = chain.dof()); empty:
+  /// mid-range.
+  Eigen::VectorXd comfortable = {};
+  double demonstrated_weight = 1.0;  ///< pull to the demonstrated joints, 0: none
+  int max_branches = 6;              ///< ways of standing that are tried before the plan is refused
 };
 
 /// Figures of a plan, for people and for the demo's last line.
@@ -49,8 +57,11 @@ struct PlanReport {
   double max_rotation_error_rad = 0;
   collision::Clearance smallest_clearance;
   double smallest_clearance_time_s = 0;
-  double time_stretch = 1;  ///< how much slower than demonstrated, 1: as demonstrated
-  double approach_s = 0;    ///< time from the start state to the motion's first frame
+  double time_stretch = 1;        ///< how much slower than demonstrated, 1: as demonstrated
+  double style_error_rad = 0;     ///< root mean square difference to the demonstrated joints
+  double max_joint_step_rad = 0;  ///< largest step of a joint between two frames of the skill
+  int branches_tried = 1;
+  double approach_s = 0;  ///< time from the start state to the motion's first frame
   std::vector<std::string> warnings;
 };
 

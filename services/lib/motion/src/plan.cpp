@@ -1,0 +1,436 @@
+#include "exemplar/motion/plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "approach.hpp"
+#include "branches.hpp"
+#include "describe.hpp"
+#include "exemplar/base/text.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
+#include "path_ik.hpp"
+#include "timing.hpp"
+#include "trajectory.hpp"
+
+namespace exemplar::motion {
+namespace {
+
+using demonstration::SkillMotion;
+
+constexpr double kDemonstratedDeviation_rad = 0.2;
+/// Of the half range, where nothing was demonstrated.
+constexpr double kComfortableShare = 0.6;
+/// The motion begins where the robot stands when its first pose is this near.
+constexpr double kSameStart_m = 0.02;
+constexpr double kSameStart_rad = 0.25;
+constexpr double kRoughSmoothness = 1e-4;
+constexpr double kLargeJointStep_rad = 0.2;
+
+std::string FrameAt(const SkillMotion& motion, int frame) {
+  return "frame " + std::to_string(frame) + " of " + std::to_string(motion.frames()) + " (" +
+         FormatFixed(motion.time_s[frame], 2) + " s)";
+}
+
+Status CheckInput(const SkillMotion& motion, const kinematics::RobotModel& model,
+                  const kinematics::Chain& chain, const Eigen::Ref<const Eigen::VectorXd>& start,
+                  const PlanOptions& options) {
+  const auto frames = static_cast<std::size_t>(motion.frames());
+  if (frames < 2) {
+    return InvalidArgument("a motion of " + std::to_string(frames) +
+                               " frames cannot be executed; at least 2 are needed",
+                           "motion");
+  }
+  for (std::size_t k = 0; k < frames; ++k) {
+    if (!std::isfinite(motion.time_s[k]) || (k > 0 && motion.time_s[k] <= motion.time_s[k - 1])) {
+      return InvalidArgument("the motion's time does not increase at frame " + std::to_string(k) +
+                                 " (" + FormatDouble(motion.time_s[k]) + " s)",
+                             "motion.time_s");
+    }
+  }
+  if (!motion.base_T_tool.empty() && motion.base_T_tool.size() != frames) {
+    return InvalidArgument("the motion has " + std::to_string(frames) + " frames but " +
+                               std::to_string(motion.base_T_tool.size()) + " tool poses",
+                           "motion.base_T_tool");
+  }
+  for (std::size_t k = 0; k < motion.base_T_tool.size(); ++k) {
+    const geometry::Pose& pose = motion.base_T_tool[k];
+    if (!pose.translation.allFinite() || !pose.rotation.coeffs().allFinite()) {
+      return InvalidArgument("the tool pose of frame " + std::to_string(k) + " is not finite",
+                             "motion.base_T_tool");
+    }
+  }
+  if (!motion.joint_names.empty() &&
+      (motion.joints.rows() != static_cast<Eigen::Index>(frames) ||
+       motion.joints.cols() != static_cast<Eigen::Index>(motion.joint_names.size()) ||
+       !motion.joints.allFinite())) {
+    return InvalidArgument("the motion's joints are not finite, or not one a frame and name",
+                           "motion.joints");
+  }
+  for (const demonstration::Contact& contact : motion.contacts) {
+    if (contact.first < 0 || contact.last < contact.first || contact.last >= motion.frames()) {
+      return InvalidArgument("the contact with \"" + contact.object + "\" spans frames " +
+                                 std::to_string(contact.first) + " to " +
+                                 std::to_string(contact.last) + " of " + std::to_string(frames),
+                             "motion.contacts");
+    }
+  }
+  if (start.size() != chain.dof() || !start.allFinite()) {
+    return InvalidArgument("the start has " + std::to_string(start.size()) +
+                               " joints, or not finite ones; the chain has " +
+                               std::to_string(chain.dof()),
+                           "start");
+  }
+  for (int j = 0; j < chain.dof(); ++j) {
+    const kinematics::JointLimits& limits = chain.limits()[j];
+    if (start[j] < limits.lower - 1e-3 || start[j] > limits.upper + 1e-3) {
+      return FailedPrecondition("joint \"" + chain.joint_names()[j] + "\" stands at " +
+                                    FormatFixed(start[j], 4) + ", outside its limits " +
+                                    FormatFixed(limits.lower, 4) + " to " +
+                                    FormatFixed(limits.upper, 4),
+                                "start");
+    }
+  }
+  for (const std::string& link : options.touch_links) {
+    if (model.FindLink(link) < 0) {
+      return NotFound("touch link: the robot \"" + model.name + "\" has no link \"" + link + "\"",
+                      "touch_links");
+    }
+  }
+  if (!(options.speed_scale > 0 && options.speed_scale <= 1)) {
+    return InvalidArgument(
+        "speed is " + FormatDouble(options.speed_scale) + ", must be above 0 and at most 1",
+        "speed");
+  }
+  if (!(options.approach_velocity > 0 && options.approach_velocity <= 1)) {
+    return InvalidArgument("approach velocity is " + FormatDouble(options.approach_velocity) +
+                               ", must be above 0 and at most 1",
+                           "approach_velocity");
+  }
+  if (options.comfortable.size() != 0 && options.comfortable.size() != chain.dof()) {
+    return InvalidArgument("the comfortable posture has " +
+                               std::to_string(options.comfortable.size()) +
+                               " joints; the chain has " + std::to_string(chain.dof()),
+                           "comfortable");
+  }
+  return {};
+}
+
+Eigen::VectorXd Comfortable(const kinematics::Chain& chain, const PlanOptions& options) {
+  if (options.comfortable.size() == chain.dof()) return options.comfortable;
+  Eigen::VectorXd middle(chain.dof());
+  for (int j = 0; j < chain.dof(); ++j) {
+    const kinematics::JointLimits& limits = chain.limits()[j];
+    const bool bounded = std::isfinite(limits.lower) && std::isfinite(limits.upper);
+    middle[j] = bounded ? 0.5 * (limits.lower + limits.upper) : 0.0;
+  }
+  return middle;
+}
+
+/// The problem of a motion, and which of the chain's joints it demonstrates (columns of
+/// motion.joints, -1: none).
+struct Prepared {
+  PathProblem path;
+  std::vector<int> demonstrated;
+};
+
+Result<Prepared> Prepare(const SkillMotion& motion, const kinematics::Chain& chain,
+                         const Eigen::Ref<const Eigen::VectorXd>& start,
+                         const PlanOptions& options) {
+  const int frames = motion.frames();
+  Prepared out;
+  PathProblem& path = out.path;
+  path.time_s = motion.time_s;
+  const double offset = path.time_s.front();
+  for (double& t : path.time_s) t -= offset;
+  path.style = Comfortable(chain, options).transpose().replicate(frames, 1);
+  path.style_deviation_rad.resize(chain.dof());
+  for (int j = 0; j < chain.dof(); ++j) {
+    const auto& names = motion.joint_names;
+    const auto found = std::find(names.begin(), names.end(), chain.joint_names()[j]);
+    const int column = found == names.end() ? -1 : static_cast<int>(found - names.begin());
+    out.demonstrated.push_back(column);
+    const kinematics::JointLimits& limits = chain.limits()[j];
+    const double half_range =
+        std::isfinite(limits.upper - limits.lower) ? 0.5 * (limits.upper - limits.lower) : M_PI;
+    path.style_deviation_rad[j] = kComfortableShare * half_range;
+    if (column >= 0 && options.demonstrated_weight > 0) {
+      path.style.col(j) = motion.joints.col(column);
+      path.style_deviation_rad[j] =
+          kDemonstratedDeviation_rad / std::sqrt(options.demonstrated_weight);
+    }
+  }
+  if (!motion.base_T_tool.empty()) {
+    path.base_T_tool = motion.base_T_tool;
+    path.use_rotation = motion.has_orientation;
+  } else {
+    for (std::size_t j = 0; j < out.demonstrated.size(); ++j) {
+      if (out.demonstrated[j] < 0) {
+        return InvalidArgument("the motion has no tool path and does not name joint \"" +
+                                   chain.joint_names()[j] + "\" of the robot",
+                               "motion.joints");
+      }
+    }
+    Eigen::VectorXd q(chain.dof());
+    for (int k = 0; k < frames; ++k) {
+      for (int j = 0; j < chain.dof(); ++j) q[j] = motion.joints(k, out.demonstrated[j]);
+      path.base_T_tool.push_back(chain.ToolPose(q));
+    }
+  }
+  path.exact.assign(static_cast<std::size_t>(frames), false);
+  for (const demonstration::Contact& contact : motion.contacts) {
+    for (int k = contact.first; k <= contact.last; ++k) path.exact[k] = true;
+  }
+  const geometry::Pose now = chain.ToolPose(start);
+  const geometry::Pose& first = path.base_T_tool.front();
+  if ((now.translation - first.translation).norm() < kSameStart_m &&
+      (!path.use_rotation ||
+       geometry::AngleBetween(now.rotation, first.rotation) < kSameStart_rad)) {
+    path.first = start;
+  }
+  return out;
+}
+
+/// Errors of the joints against the tool path; refuses what is out of tolerance.
+Status VerifyPath(const SkillMotion& motion, const kinematics::Chain& chain,
+                  const Prepared& prepared, const Eigen::MatrixXd& joints,
+                  const PlanOptions& options, PlanReport& report) {
+  const PathProblem& path = prepared.path;
+  double worst_excess = 1;
+  std::string worst;
+  double style = 0;
+  int style_terms = 0;
+  Eigen::VectorXd q(chain.dof());
+  for (int k = 0; k < motion.frames(); ++k) {
+    q = joints.row(k).transpose();
+    const geometry::Pose at = chain.ToolPose(q);
+    const double position = (at.translation - path.base_T_tool[k].translation).norm();
+    const double rotation =
+        path.use_rotation ? geometry::AngleBetween(at.rotation, path.base_T_tool[k].rotation) : 0.0;
+    const bool exact = path.exact[k];
+    double& position_report = exact ? report.max_contact_error_m : report.max_position_error_m;
+    position_report = std::max(position_report, position);
+    report.max_rotation_error_rad = std::max(report.max_rotation_error_rad, rotation);
+    const double tolerance = exact ? options.position_tolerance_m : options.free_tolerance_m;
+    if (position / tolerance > worst_excess) {
+      worst_excess = position / tolerance;
+      worst = FrameAt(motion, k) + (exact ? ", in contact" : "") + ": the tool stays " +
+              FormatFixed(1000 * position, 2) + " mm away from (" +
+              FormatFixed(path.base_T_tool[k].translation.x(), 3) + ", " +
+              FormatFixed(path.base_T_tool[k].translation.y(), 3) + ", " +
+              FormatFixed(path.base_T_tool[k].translation.z(), 3) + ") m, " +
+              FormatFixed(1000 * tolerance, 2) + " mm allowed";
+    }
+    if (rotation / options.rotation_tolerance_rad > worst_excess) {
+      worst_excess = rotation / options.rotation_tolerance_rad;
+      worst = FrameAt(motion, k) + ": the tool is turned " + FormatFixed(rotation, 3) +
+              " rad away from what is asked, " + FormatFixed(options.rotation_tolerance_rad, 3) +
+              " rad allowed";
+    }
+    for (int j = 0; j < chain.dof(); ++j) {
+      if (prepared.demonstrated[j] < 0) continue;
+      style += std::pow(joints(k, j) - motion.joints(k, prepared.demonstrated[j]), 2);
+      ++style_terms;
+    }
+    if (k > 0) {
+      report.max_joint_step_rad = std::max(
+          report.max_joint_step_rad, (joints.row(k) - joints.row(k - 1)).cwiseAbs().maxCoeff());
+    }
+  }
+  if (style_terms > 0) report.style_error_rad = std::sqrt(style / style_terms);
+  if (!worst.empty()) {
+    return FailedPrecondition("the robot cannot follow the motion: " + worst, "motion.base_T_tool");
+  }
+  return {};
+}
+
+/// A stretch of a trajectory with its own permissions.
+struct Stretch {
+  double begin_s = 0;
+  double end_s = 0;
+  std::vector<collision::AllowedTouch> allowed;
+};
+
+/// From before to after a contact, until the tool is `margin_m` away from where it was at the
+/// contact's ends.
+std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
+                                     const kinematics::Chain& chain, double begin_s, double end_s,
+                                     double margin_m) {
+  Eigen::VectorXd q(chain.dof());
+  Eigen::VectorXd velocity(chain.dof());
+  const auto tool_at = [&](double t) {
+    Evaluate(trajectory, t, q, velocity);
+    return chain.ToolPose(q).translation;
+  };
+  const std::vector<double>& time = trajectory.time_s;
+  const Eigen::Vector3d at_begin = tool_at(begin_s);
+  auto first = std::upper_bound(time.begin(), time.end(), begin_s) - 1;
+  while (first != time.begin() && (tool_at(*first) - at_begin).norm() <= margin_m) --first;
+  const Eigen::Vector3d at_end = tool_at(end_s);
+  auto last = std::lower_bound(time.begin(), time.end() - 1, end_s);
+  while (last + 1 != time.end() && (tool_at(*last) - at_end).norm() <= margin_m) ++last;
+  return {*first, *last};
+}
+
+std::vector<Stretch> MakeStretches(const SkillMotion& motion, const kinematics::Chain& chain,
+                                   const JointTrajectory& trajectory, const PlanOptions& options,
+                                   const std::vector<double>& frame_time_s, double offset_s) {
+  struct Touch {
+    double begin_s, end_s;
+    const std::string* object;
+  };
+  std::vector<Touch> touches;
+  std::vector<double> edges = {0, trajectory.duration_s()};
+  for (const demonstration::Contact& contact : motion.contacts) {
+    const auto [begin_s, end_s] =
+        TouchTimes(trajectory, chain, offset_s + frame_time_s[contact.first],
+                   offset_s + frame_time_s[contact.last], options.touch_margin_m);
+    touches.push_back({std::max(offset_s, begin_s), end_s, &contact.object});
+    edges.push_back(touches.back().begin_s);
+    edges.push_back(touches.back().end_s);
+  }
+  std::sort(edges.begin(), edges.end());
+  const std::vector<std::string> links = options.touch_links.empty()
+                                             ? std::vector<std::string>{chain.tip_link()}
+                                             : options.touch_links;
+  std::vector<Stretch> stretches;
+  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
+    if (edges[i + 1] - edges[i] <= 0) continue;
+    Stretch stretch{edges[i], edges[i + 1], {}};
+    const double middle = 0.5 * (edges[i] + edges[i + 1]);
+    for (const Touch& touch : touches) {
+      if (middle < touch.begin_s || middle > touch.end_s) continue;
+      for (const std::string& link : links) stretch.allowed.push_back({link, *touch.object});
+    }
+    stretches.push_back(std::move(stretch));
+  }
+  return stretches;
+}
+
+void MeasureClearance(const JointTrajectory& trajectory, const kinematics::RobotModel& model,
+                      const kinematics::Chain& chain, const collision::CollisionChecker& checker,
+                      const std::vector<Stretch>& stretches, PlanReport& report) {
+  report.smallest_clearance.distance_m = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd q = kinematics::FullJointVector(model, chain, trajectory.positions.row(0));
+  const std::vector<collision::AllowedTouch> none;
+  for (std::size_t i = 0; i < trajectory.time_s.size(); ++i) {
+    const double t = trajectory.time_s[i];
+    const auto stretch = std::find_if(stretches.begin(), stretches.end(), [&](const Stretch& s) {
+      return t >= s.begin_s && t <= s.end_s;
+    });
+    for (int j = 0; j < chain.dof(); ++j) {
+      q[chain.joint_indices()[j]] = trajectory.positions(static_cast<Eigen::Index>(i), j);
+    }
+    const collision::Clearance clearance =
+        checker.SmallestClearance(q, stretch == stretches.end() ? none : stretch->allowed);
+    if (clearance.distance_m < report.smallest_clearance.distance_m) {
+      report.smallest_clearance = clearance;
+      report.smallest_clearance_time_s = t;
+    }
+  }
+}
+
+class Planner {
+ public:
+  Planner(const SkillMotion& motion, const kinematics::RobotModel& model,
+          const kinematics::Chain& chain, const collision::CollisionChecker& checker,
+          const Eigen::Ref<const Eigen::VectorXd>& start, const PlanOptions& options,
+          const Prepared& prepared)
+      : motion_(motion),
+        model_(model),
+        chain_(chain),
+        checker_(checker),
+        start_(start),
+        options_(options),
+        prepared_(prepared) {}
+
+  Result<PlannedMotion> From(const Branch& branch, std::stop_token stop) const {
+    PathSolution path = SolvePath(chain_, prepared_.path, branch.joints, stop);
+    PlannedMotion plan;
+    Status followed = VerifyPath(motion_, chain_, prepared_, path.joints, options_, plan.report);
+    if (!followed.ok()) {
+      // Perhaps only too quick to be followed smoothly; the timing slows it down afterwards.
+      PathProblem rougher = prepared_.path;
+      rougher.smoothness = kRoughSmoothness;
+      path = SolvePath(chain_, rougher, path.joints, stop);
+      plan.report = {};
+      followed = VerifyPath(motion_, chain_, prepared_, path.joints, options_, plan.report);
+    }
+    if (!followed.ok()) return followed.error();
+
+    std::vector<double> frame_time_s;
+    const JointTrajectory skill = TimePath(prepared_.path.time_s, path.joints, chain_.joint_names(),
+                                           chain_.limits(), options_.speed_scale, frame_time_s);
+    Result<JointTrajectory> approach = PlanApproach(model_, chain_, checker_, start_,
+                                                    skill.positions.row(0).transpose(), options_);
+    if (!approach.ok()) return approach.error();
+    const double offset = approach->duration_s();
+    plan.trajectory = Concatenate(*approach, skill);
+    plan.report.approach_s = offset;
+    plan.report.time_stretch = skill.duration_s() / prepared_.path.time_s.back();
+
+    const std::vector<Stretch> stretches =
+        MakeStretches(motion_, chain_, plan.trajectory, options_, frame_time_s, offset);
+    const TrajectoryPath swept(plan.trajectory, model_, chain_);
+    for (const Stretch& stretch : stretches) {
+      const std::optional<collision::Violation> violation = checker_.FirstViolation(
+          swept, stretch.begin_s, stretch.end_s, options_.required_clearance_m, stretch.allowed);
+      if (violation) {
+        return FailedPrecondition("the motion is not free: " +
+                                      DescribeViolation(*violation, options_.required_clearance_m),
+                                  "motion");
+      }
+    }
+    MeasureClearance(plan.trajectory, model_, chain_, checker_, stretches, plan.report);
+    for (const demonstration::Contact& contact : motion_.contacts) {
+      plan.contacts.push_back({contact.object, offset + frame_time_s[contact.first],
+                               offset + frame_time_s[contact.last], contact.base_p_contact});
+    }
+    if (plan.report.max_joint_step_rad > kLargeJointStep_rad) {
+      plan.report.warnings.push_back("a joint moves " +
+                                     FormatFixed(plan.report.max_joint_step_rad, 2) +
+                                     " rad from one frame to the next");
+    }
+    return plan;
+  }
+
+ private:
+  const SkillMotion& motion_;
+  const kinematics::RobotModel& model_;
+  const kinematics::Chain& chain_;
+  const collision::CollisionChecker& checker_;
+  Eigen::VectorXd start_;
+  const PlanOptions& options_;
+  const Prepared& prepared_;
+};
+
+}  // namespace
+
+Result<PlannedMotion> PlanMotion(const SkillMotion& motion, const kinematics::RobotModel& model,
+                                 const kinematics::Chain& chain,
+                                 const collision::CollisionChecker& checker,
+                                 const Eigen::Ref<const Eigen::VectorXd>& start,
+                                 const PlanOptions& options, std::stop_token stop) {
+  const Status input = CheckInput(motion, model, chain, start, options);
+  if (!input.ok()) return input.error();
+  Result<Prepared> prepared = Prepare(motion, chain, start, options);
+  if (!prepared.ok()) return prepared.error();
+  const Planner planner(motion, model, chain, checker, start, options, *prepared);
+  std::optional<Error> first_refusal;
+  int tried = 0;
+  for (const Branch& branch : FindBranches(chain, prepared->path, start)) {
+    if (tried == std::max(1, options.max_branches)) break;
+    ++tried;
+    Result<PlannedMotion> plan = planner.From(branch, stop);
+    if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "planning was cancelled"};
+    if (plan.ok()) {
+      plan->report.branches_tried = tried;
+      return plan;
+    }
+    // The best branch's refusal says most about the motion itself.
+    if (!first_refusal) first_refusal = plan.error();
+  }
+  return *first_refusal;
+}
+
+}  // namespace exemplar::motion

@@ -1,0 +1,44 @@
+#pragma once
+// How fast a path may be run through.
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "exemplar/kinematics/robot_model.hpp"
+#include "exemplar/motion/plan.hpp"
+
+namespace exemplar::motion {
+
+/// Runs through `joints` (frames x n, at `time_s`, as demonstrated) no faster than demonstrated
+/// times `speed_scale`, within velocity and acceleration limits, from rest to rest: reachability
+/// analysis over the squared path speed (Pham & Pham 2018) with the demonstrated speed as one more
+/// bound. `frame_time_s` gets the new time of each frame. The limits hold everywhere on the cubic
+/// pieces of the result.
+JointTrajectory TimePath(std::span<const double> time_s,
+                         const Eigen::Ref<const Eigen::MatrixXd>& joints,
+                         const std::vector<std::string>& joint_names,
+                         const std::vector<kinematics::JointLimits>& limits, double speed_scale,
+                         std::vector<double>& frame_time_s);
+
+/// From rest to rest along a straight line in joint space with the least jerk, within
+/// `velocity_fraction` of the velocity limits and the acceleration limits.
+JointTrajectory TimeLine(const Eigen::Ref<const Eigen::VectorXd>& from,
+                         const Eigen::Ref<const Eigen::VectorXd>& to,
+                         const std::vector<std::string>& joint_names,
+                         const std::vector<kinematics::JointLimits>& limits,
+                         double velocity_fraction);
+
+/// `second` after `first`. Precondition: they meet at rest in one posture.
+JointTrajectory Concatenate(const JointTrajectory& first, const JointTrajectory& second);
+
+/// The largest ratio of a velocity to its limit, and of an acceleration to its limit, anywhere on
+/// the cubic pieces.
+struct LimitUse {
+  double velocity = 0;
+  double acceleration = 0;
+};
+LimitUse MeasureLimitUse(const JointTrajectory& trajectory,
+                         const std::vector<kinematics::JointLimits>& limits);
+
+}  // namespace exemplar::motion
