@@ -6,6 +6,9 @@
 namespace exemplar::recording {
 namespace {
 
+/// Bytes that a writer of a later version may have put behind DataEnd's fields.
+constexpr std::uint64_t kLargestPadding = 64;
+
 struct MessagePlace {
   Stamp log_time;
   std::uint64_t offset = 0;  ///< within the chunk
@@ -69,6 +72,26 @@ class McapIndexedReader final : public IndexedReader {
   }
   Result<Metadata> ReadMetadata(const MetadataIndex& index) override {
     return ReadAs<Metadata>(index.offset, "metadata record");
+  }
+
+  Result<DataEnd> ReadDataEnd() override {
+    // The data section ends where the summary, or without one the footer, begins. The record's own
+    // length is known but for padding, so it is looked for backwards from there.
+    const std::uint64_t end = footer_.summary_start != 0 ? footer_.summary_start : footer_offset_;
+    for (std::uint64_t padding = 0; padding <= kLargestPadding; ++padding) {
+      const std::uint64_t size = kRecordPrefix + 4 + padding;
+      if (end < sizeof kMagic + size) break;
+      Result<std::optional<RawRecord>> raw =
+          ReadRawRecord(source_, end - size, options_.largest_record_bytes);
+      if (!raw.ok() || !raw->has_value() || (*raw)->length != 4 + padding ||
+          static_cast<Opcode>((*raw)->opcode) != Opcode::kDataEnd) {
+        continue;
+      }
+      Result<std::optional<Record>> record = Decode((*raw)->opcode, (*raw)->content);
+      if (!record.ok()) return DamagedAt(end - size, record.error().message);
+      return std::get<DataEnd>(**record);
+    }
+    return DamagedAt(end, "the data section's end is not before the summary");
   }
 
   Result<std::vector<Record>> ReadChunk(const ChunkIndex& index) override {

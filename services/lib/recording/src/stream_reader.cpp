@@ -97,11 +97,15 @@ class McapStreamReader final : public StreamReader {
                                             ", must be " + std::to_string(end->data_section_crc));
       }
     } else if (const Footer* footer = std::get_if<Footer>(&*decoded)) {
+      if (summary_begin_ == 0) return DamagedAt(record.offset, "no data end before the footer");
       const bool covers_footer_only = footer->summary_start == 0;
-      if (footer->summary_crc == 0 ||
-          (!covers_footer_only && footer->summary_start != summary_begin_)) {
-        return {};
+      if (!covers_footer_only && footer->summary_start != summary_begin_) {
+        return DamagedAt(record.offset, "the footer says that the summary begins at byte " +
+                                            std::to_string(footer->summary_start) +
+                                            ", the data section ends at byte " +
+                                            std::to_string(summary_begin_));
       }
+      if (footer->summary_crc == 0) return {};
       std::uint32_t crc = covers_footer_only ? 0 : crc_;
       crc = Crc32(crc, PrefixOf(record));
       crc = Crc32(crc, ByteView(record.content).first(16));

@@ -60,6 +60,8 @@ class IndexedReader {
 
   virtual Result<Attachment> ReadAttachment(const AttachmentIndex& index) = 0;
   virtual Result<Metadata> ReadMetadata(const MetadataIndex& index) = 0;
+  /// The end of the data section.
+  virtual Result<DataEnd> ReadDataEnd() = 0;
   /// The records of one chunk as they stand.
   virtual Result<std::vector<Record>> ReadChunk(const ChunkIndex& index) = 0;
   /// Calls `visit` in order of log time (file order where equal) until it returns false. Holds no
