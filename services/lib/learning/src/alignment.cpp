@@ -23,6 +23,21 @@ int Rank(const Marker& marker) {
   return 0;
 }
 
+// Means of so many neighbours that the signal is not much finer than the grid of the correlation.
+Eigen::VectorXd Condensed(const Eigen::VectorXd& signal) {
+  const Eigen::Index fold =
+      std::max<Eigen::Index>(1, signal.size() / (2 * MarkerChoiceOptions().points));
+  if (fold == 1) return signal;
+  const Eigen::Index count = signal.size() / fold;
+  Eigen::VectorXd means(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Eigen::Index first = k * signal.size() / count;
+    const Eigen::Index behind = (k + 1) * signal.size() / count;
+    means[k] = signal.segment(first, behind - first).mean();
+  }
+  return means;
+}
+
 Candidates CandidatesOf(const UniformTrial& trial, const Segmentation& segmentation) {
   constexpr double kNear_s = 0.1;
   constexpr double kNearPart = 0.02;  // of the trial
@@ -30,7 +45,7 @@ Candidates CandidatesOf(const UniformTrial& trial, const Segmentation& segmentat
   Candidates result;
   result.choice.id = trial.id;
   result.choice.duration_s = trial.time_s.back();
-  result.choice.signal = segmentation.msv;
+  result.choice.signal = Condensed(segmentation.msv);
   const double step_s = trial.time_s[1];
   const double duration_s = trial.time_s.back();
   const double near_s = std::max(3 * step_s, std::min(kNear_s, kNearPart * duration_s));
@@ -155,8 +170,11 @@ Result<Alignment> Align(std::vector<UniformTrial> trials, const LearnOptions& op
 
   std::vector<MarkerCandidates> choices;
   for (const Candidates& c : candidates) choices.push_back(c.choice);
-  MarkerChoice choice = ChooseByVote(choices);
+  const MarkerChoice choice =
+      options.selection == Selection::kJoint ? ChooseJointly(choices) : ChooseByVote(choices);
   result.warnings.insert(result.warnings.end(), choice.warnings.begin(), choice.warnings.end());
+  result.choice_value = choice.value;
+  result.choice_bound = choice.bound;
   if (stop.stop_requested()) return cancelled();
   report(0.7, "marker choice");
 

@@ -132,9 +132,10 @@ Result<LearnOptions> LearnOptions::FromStrings(const std::map<std::string, std::
   for (const auto& [name, value] : options) {
     if (const Status set = Set(result, name, value); !set) return set.error();
   }
-  // The paper's Eq. 2 as written, unless asked otherwise.
-  if (result.method == Method::kPaper && !options.contains("force_rate")) {
-    result.force_rate = ForceRate::kSigned;
+  // The paper's rules go together, unless asked otherwise.
+  if (result.method == Method::kPaper) {
+    if (!options.contains("force_rate")) result.force_rate = ForceRate::kSigned;
+    if (!options.contains("selection")) result.selection = Selection::kVote;
   }
   if (result.cutoff_hz > 0.4 * result.sample_rate_hz) {
     return Wrong("cutoff_hz", FormatDouble(result.cutoff_hz),

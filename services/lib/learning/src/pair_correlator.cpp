@@ -9,7 +9,7 @@
 namespace exemplar::learning {
 namespace {
 
-constexpr std::size_t kMemory = std::size_t{1} << 15;  // stretches remembered; a power of two
+constexpr std::size_t kMemory = std::size_t{1} << 16;  // stretches remembered; a power of two
 constexpr double kConstant = 1e-12;  // variance of a warped signal of unit variance
 constexpr std::uint16_t kStart = 0xFFFF;
 constexpr std::uint16_t kEnd = 0xFFFE;
@@ -70,17 +70,12 @@ void PairCorrelator::Restart(std::size_t size) {
 
 void PairCorrelator::Limit(Side& side, std::size_t stretch, double next_tangent) {
   const double slope = side.slope[stretch];  // positive: markers are distinct
-  const double a = side.entering[stretch] / slope;
-  const double b = next_tangent / slope;
-  const double squared = a * a + b * b;
-  if (squared > 9) {
-    const double scale = 3 * slope / std::sqrt(squared);
-    side.tangent[stretch] = scale * a;
-    side.entering[stretch + 1] = scale * b;
-  } else {
-    side.tangent[stretch] = side.entering[stretch];
-    side.entering[stretch + 1] = next_tangent;
-  }
+  const double entering = side.entering[stretch];
+  const double squared = entering * entering + next_tangent * next_tangent;
+  double scale = 1;
+  if (squared > 9 * slope * slope) scale = 3 * slope / std::sqrt(squared);
+  side.tangent[stretch] = scale * entering;
+  side.entering[stretch + 1] = scale * next_tangent;
 }
 
 // A knot fixes the unlimited tangent of the one before, hence the limit of the second stretch
@@ -92,9 +87,9 @@ void PairCorrelator::Push(std::size_t knot, double a_s, double b_s, std::uint16_
   a_.name[knot] = a_name;
   b_.name[knot] = b_name;
   common_s_[knot] = (a_s + b_s) / 2;
-  const double width = common_s_[knot] - common_s_[knot - 1];
+  const double per_width = 1 / (common_s_[knot] - common_s_[knot - 1]);
   for (Side* side : {&a_, &b_}) {
-    side->slope[knot - 1] = (side->own_s[knot] - side->own_s[knot - 1]) / width;
+    side->slope[knot - 1] = (side->own_s[knot] - side->own_s[knot - 1]) * per_width;
     if (knot == 1) {
       side->entering[0] = side->slope[0];
     } else {
@@ -154,14 +149,7 @@ PairCorrelator::Sums PairCorrelator::Compute(std::size_t stretch) const {
   // The warp of either side as a cubic of the part of the stretch, in samples.
   struct Cubic {
     double c0, c1, c2, c3;
-    const CorrelatedTrial::Sample* samples;
-    int highest;
-    double At(double s) const {
-      const double place = c0 + s * (c1 + s * (c2 + s * c3));
-      const int at = std::clamp(static_cast<int>(place), 0, highest);
-      const CorrelatedTrial::Sample& sample = samples[at];
-      return sample.value + (place - at) * sample.slope;
-    }
+    double At(double s) const { return c0 + s * (c1 + s * (c2 + s * c3)); }
   };
   const auto cubic = [&](const Side& side) {
     const double scale = side.trial->samples_per_s;
@@ -169,25 +157,38 @@ PairCorrelator::Sums PairCorrelator::Compute(std::size_t stretch) const {
     const double rise = side.own_s[stretch + 1] * scale - y0;
     const double m0 = side.tangent[stretch] * width * scale;
     const double m1 = side.tangent[stretch + 1] * width * scale;
-    return Cubic{y0,
-                 m0,
-                 3 * rise - 2 * m0 - m1,
-                 m0 + m1 - 2 * rise,
-                 side.trial->samples.data(),
-                 static_cast<int>(side.trial->samples.size()) - 2};
+    return Cubic{y0, m0, 3 * rise - 2 * m0 - m1, m0 + m1 - 2 * rise};
+  };
+  const auto value = [](const CorrelatedTrial& trial, double place) {
+    const int highest = static_cast<int>(trial.samples.size()) - 2;
+    const int at = std::clamp(static_cast<int>(place), 0, highest);
+    const CorrelatedTrial::Sample& sample = trial.samples[static_cast<std::size_t>(at)];
+    return sample.value + (place - at) * sample.slope;
   };
   const Cubic a = cubic(a_);
   const Cubic b = cubic(b_);
+  const double per_width = 1 / width;
   Sums sums;
-  for (int p = first; p < behind; ++p) {
-    const double s = (p * step_s_ - from) / width;
-    const double va = a.At(s);
-    const double vb = b.At(s);
-    sums.a += va;
-    sums.b += vb;
-    sums.aa += va * va;
-    sums.bb += vb * vb;
-    sums.ab += va * vb;
+  // Places first, values after: the first loop is plain arithmetic that the compiler vectorises.
+  constexpr int kBatch = 64;
+  std::array<double, kBatch> a_place;
+  std::array<double, kBatch> b_place;
+  for (int batch = first; batch < behind; batch += kBatch) {
+    const int count = std::min(kBatch, behind - batch);
+    for (int i = 0; i < count; ++i) {
+      const double s = ((batch + i) * step_s_ - from) * per_width;
+      a_place[static_cast<std::size_t>(i)] = a.At(s);
+      b_place[static_cast<std::size_t>(i)] = b.At(s);
+    }
+    for (int i = 0; i < count; ++i) {
+      const double va = value(*a_.trial, a_place[static_cast<std::size_t>(i)]);
+      const double vb = value(*b_.trial, b_place[static_cast<std::size_t>(i)]);
+      sums.a += va;
+      sums.b += vb;
+      sums.aa += va * va;
+      sums.bb += vb * vb;
+      sums.ab += va * vb;
+    }
   }
   return sums;
 }
@@ -203,6 +204,8 @@ struct PairCorrelator::Walk {
   const std::vector<int>& b_kept;
   std::size_t size;
   const Take& take;
+  // [follow][after]: subsets of `follow` candidates among `after`.
+  std::vector<std::vector<std::size_t>> subsets;
 };
 
 void PairCorrelator::Descend(const Walk& walk, std::size_t knot, std::size_t a_from,
@@ -213,9 +216,7 @@ void PairCorrelator::Descend(const Walk& walk, std::size_t knot, std::size_t a_f
   }
   // So many markers still follow this one; so many subsets begin with the path up to here and it.
   const std::size_t follow = walk.size - knot;
-  const auto subsets = [&](std::size_t all, std::size_t place) {
-    return static_cast<std::size_t>(Binomial(all - place - 1, follow));
-  };
+  const std::vector<std::size_t>& subsets = walk.subsets[follow];
   const std::size_t na = walk.a_kept.size();
   const std::size_t nb = walk.b_kept.size();
   std::size_t a_at = a_rank;
@@ -224,16 +225,23 @@ void PairCorrelator::Descend(const Walk& walk, std::size_t knot, std::size_t a_f
     for (std::size_t b = b_from; b + follow < nb; ++b) {
       PushMarker(knot, walk.a_kept[a], walk.b_kept[b]);
       Descend(walk, knot + 1, a + 1, b + 1, a_at, b_at);
-      b_at += subsets(nb, b);
+      b_at += subsets[nb - b - 1];
     }
-    a_at += subsets(na, a);
+    a_at += subsets[na - a - 1];
   }
 }
 
 void PairCorrelator::CorrelateAll(const std::vector<int>& a_kept, const std::vector<int>& b_kept,
                                   std::size_t size, const Take& take) {
   Restart(size);
-  Descend({a_kept, b_kept, size, take}, 1, 0, 0, 0, 0);
+  Walk walk{a_kept, b_kept, size, take, {}};
+  for (std::size_t follow = 0; follow < size; ++follow) {
+    walk.subsets.emplace_back();
+    for (std::size_t after = 0; after < std::max(a_kept.size(), b_kept.size()); ++after) {
+      walk.subsets.back().push_back(static_cast<std::size_t>(Binomial(after, follow)));
+    }
+  }
+  Descend(walk, 1, 0, 0, 0, 0);
 }
 
 }  // namespace exemplar::learning

@@ -71,10 +71,13 @@ struct Alignment {
   std::vector<double> time_s;   ///< the common time base, N frames from 0
   std::vector<double> knots_s;  ///< mean marker times with start and end, on the common time base
   std::vector<AlignedTrial> trials;
-  Eigen::MatrixXd canonical_joints;   ///< mean of the warped trials, N x joints (or N x 0)
-  Eigen::MatrixXd canonical_tool;     ///< N x 3 (or 0 x 3)
-  double mean_correlation = 0;        ///< over pairs, after alignment
-  double plain_correlation = 0;       ///< over pairs, length-normalised only
+  Eigen::MatrixXd canonical_joints;  ///< mean of the warped trials, N x joints (or N x 0)
+  Eigen::MatrixXd canonical_tool;    ///< N x 3 (or 0 x 3)
+  double mean_correlation = 0;       ///< over pairs, after alignment
+  double plain_correlation = 0;      ///< over pairs, length-normalised only
+  /// Of selection=joint: the sum of r over pairs that the choice reached, and what none can exceed.
+  double choice_value = 0;
+  double choice_bound = 0;
   std::vector<std::string> warnings;  ///< names of trials that drag N_min down, have no marker, ...
 };
 

@@ -23,9 +23,9 @@ struct MarkerChoiceOptions {
   int points = 240;
   /// Correlations of two subsets that may be computed. Where a rule asks for more, the candidates
   /// of least score are left out, and `warnings` says so.
-  double max_subset_pairs = 600000;
-  /// Nodes that the search for the joint choice may open.
-  int max_nodes = 200000;
+  double max_subset_pairs = 300000;
+  /// Look-ups of correlations that the search for the joint choice may make.
+  double max_search_steps = 1e8;
 };
 
 /// One subset of N_min candidates for each trial, N_min being the least number that a trial has.
