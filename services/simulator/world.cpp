@@ -58,6 +58,10 @@ geometry::Pose BodyPose(const mjData& data, int body) {
   return {{p[0], p[1], p[2]}, Eigen::Quaterniond(q[0], q[1], q[2], q[3])};
 }
 
+Error NoSuchThing(std::string_view thing) {
+  return NotFound("there is no \"" + std::string(thing) + "\" in the scene", "object");
+}
+
 /// A servo-driven joint of the chain.
 struct Drive {
   int qpos = 0;
@@ -348,9 +352,7 @@ void World::ResetClicks() {
 Status World::Place(std::string_view thing, const geometry::Pose& base_T_thing) {
   Impl& w = *impl_;
   const int body = BodyId(*w.model, ThingBody(std::string(thing)));
-  if (body < 0) {
-    return NotFound("there is no \"" + std::string(thing) + "\" in the scene", "object");
-  }
+  if (body < 0) return NoSuchThing(thing);
   const int mocap = w.model->body_mocapid[body];
   mjtNum* position = w.data->mocap_pos + 3 * mocap;
   mjtNum* rotation = w.data->mocap_quat + 4 * mocap;
@@ -378,6 +380,12 @@ Status World::Place(std::string_view thing, const geometry::Pose& base_T_thing) 
                               "object");
   }
   return {};
+}
+
+Result<geometry::Pose> World::ThingPose(std::string_view thing) const {
+  const int body = BodyId(*impl_->model, ThingBody(std::string(thing)));
+  if (body < 0) return NoSuchThing(thing);
+  return BodyPose(*impl_->data, body);
 }
 
 Snapshot World::snapshot() const {

@@ -77,6 +77,9 @@ class World {
   /// Moves an obstacle or a button. kNotFound; kFailedPrecondition: it would stand in the robot.
   Status Place(std::string_view thing, const geometry::Pose& base_T_thing);
 
+  /// base_T_thing of an obstacle or a button. kNotFound.
+  Result<geometry::Pose> ThingPose(std::string_view thing) const;
+
   Snapshot snapshot() const;
   /// For drawing (renderer.hpp).
   const mjModel_* model() const;

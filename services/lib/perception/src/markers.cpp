@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "edge_refinement.hpp"
+
 namespace exemplar::perception {
 namespace {
 
@@ -50,6 +52,7 @@ std::vector<DetectedMarker> DetectMarkers(const Picture& picture) {
   std::vector<int> ids;
   cv::aruco::detectMarkers(grey, Dictionary(), corners, ids, parameters);
 
+  const GreyView view{grey.cols, grey.rows, {grey.data, grey.total()}};
   std::map<int, int> seen;
   for (const int id : ids) ++seen[id];
   std::vector<DetectedMarker> markers;
@@ -61,6 +64,7 @@ std::vector<DetectedMarker> DetectMarkers(const Picture& picture) {
       marker.corners_px[c] = {static_cast<double>(corners[i][c].x),
                               static_cast<double>(corners[i][c].y)};
     }
+    RefineCorners(view, kMarkerCells, marker.corners_px);
     markers.push_back(marker);
   }
   return markers;

@@ -16,7 +16,7 @@ namespace exemplar::perception {
 
 struct FinderOptions {
   /// Standard deviation of a corner's place in the picture that variances never go below.
-  double corner_sigma_px = 0.1;
+  double corner_sigma_px = 0.05;
   /// Corners of the fitted marker farther than this (root mean square) from those seen: dropped.
   double largest_residual_px = 1.0;
   /// Rows of the same corner in the two pictures differ by more: not the same marker.

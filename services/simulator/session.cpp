@@ -1,0 +1,411 @@
+#include "simulator/session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "exemplar/base/text.hpp"
+#include "exemplar/ircp/control.hpp"
+#include "simulator/cameras.hpp"
+#include "simulator/outbox.hpp"
+
+namespace exemplar::simulator {
+namespace {
+
+constexpr const char* kProgram = "simulator";
+/// Behind by more than this, the world lets time pass rather than rush after it.
+constexpr Duration kLargestLag = std::chrono::milliseconds(200);
+constexpr std::size_t kStatesWaiting = 256;
+constexpr std::size_t kSamplesWaiting = 64;
+
+/// A sample for the robot's joints, as it came.
+struct Arrival {
+  ircp::Header header;
+  std::vector<std::string> names;
+  std::vector<double> positions;
+  std::vector<double> velocities;
+  Duration validity{0};
+  bool has_hand_open = false;
+  double hand_open = 0;
+};
+
+/// What goes out at the robot's rate.
+struct Outgoing {
+  ircp::JointStateSample state;
+  Follower::Mode mode = Follower::Mode::kHolding;
+};
+
+bool IsSound(const Arrival& arrival) {
+  const auto finite = [](double v) { return std::isfinite(v); };
+  return arrival.positions.size() == arrival.names.size() &&
+         (arrival.velocities.empty() || arrival.velocities.size() == arrival.names.size()) &&
+         std::all_of(arrival.positions.begin(), arrival.positions.end(), finite) &&
+         std::all_of(arrival.velocities.begin(), arrival.velocities.end(), finite);
+}
+
+const char* NameOf(Follower::Mode mode) {
+  switch (mode) {
+    case Follower::Mode::kFollowing:
+      return "following";
+    case Follower::Mode::kGoingHome:
+      return "going home";
+    case Follower::Mode::kHolding:
+      break;
+  }
+  return "holding";
+}
+
+std::string PoseText(const geometry::Pose& pose) {
+  const Eigen::Vector3d& p = pose.translation;
+  const Eigen::Quaterniond& q = pose.rotation;
+  std::vector<std::string> numbers;
+  for (const double v : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) {
+    numbers.push_back(FormatDouble(v));
+  }
+  return Join(numbers, ",");
+}
+
+/// `pose` with what `arguments` say of it.
+Result<geometry::Pose> ReadPose(const std::map<std::string, std::string>& arguments,
+                                geometry::Pose pose) {
+  const auto read = [&](const std::string& key, double& value) -> Status {
+    const auto it = arguments.find(key);
+    if (it == arguments.end()) return {};
+    const std::optional<double> number = ParseDouble(it->second);
+    if (!number || !std::isfinite(*number)) {
+      return InvalidArgument(key + ": \"" + it->second + "\" is not a finite number", key);
+    }
+    value = *number;
+    return {};
+  };
+  const char* position_keys[] = {"x", "y", "z"};
+  for (int i = 0; i < 3; ++i) {
+    if (Status status = read(position_keys[i], pose.translation[i]); !status) return status.error();
+  }
+  const char* rotation_keys[] = {"qx", "qy", "qz", "qw"};
+  const bool has_rotation = std::any_of(std::begin(rotation_keys), std::end(rotation_keys),
+                                        [&](const char* key) { return arguments.contains(key); });
+  if (!has_rotation) return pose;
+  Eigen::Vector4d rotation = Eigen::Vector4d::Zero();  // x y z w
+  for (int i = 0; i < 4; ++i) {
+    if (Status status = read(rotation_keys[i], rotation[i]); !status) return status.error();
+  }
+  if (std::abs(rotation.norm() - 1) > 0.01) {
+    return InvalidArgument(
+        "qx, qy, qz, qw: norm is " + FormatFixed(rotation.norm(), 4) + ", must be 1", "qw");
+  }
+  pose.rotation = Eigen::Quaterniond(rotation[3], rotation[0], rotation[1], rotation[2]);
+  pose.rotation.normalize();
+  return pose;
+}
+
+class RunningSession final : public Session {
+ public:
+  RunningSession(const Clock& clock, Log& log, const kinematics::RobotDescription& robot,
+                 const SessionOptions& options, World world)
+      : clock_(clock),
+        log_(log),
+        options_(options),
+        joint_names_(robot.chain.joint_names()),
+        home_(robot.home),
+        world_(std::move(world)),
+        follower_(robot.chain.limits(), robot.home, options.follower) {
+    for (const ButtonState& button : world_.buttons()) clicks_.push_back(button.clicks);
+  }
+
+  Status Connect(ircp::Bus& bus, const scene::Description& scene) {
+    if (options_.cameras && !scene.cameras.empty()) {
+      Result<std::unique_ptr<Cameras>> cameras = Cameras::Create(
+          bus, log_, world_, scene,
+          {.encoding = options_.picture_encoding, .quality = options_.picture_quality});
+      if (cameras) {
+        cameras_ = std::move(cameras).value();
+      } else if (cameras.error().code == ErrorCode::kUnavailable) {
+        log_.Warning("no pictures: this machine cannot draw", {{"cause", cameras.error().message}});
+      } else {
+        return cameras.error();
+      }
+    }
+    auto writer = bus.MakeWriter<ircp::JointStateSample>("robot");
+    if (!writer) return writer.error();
+    state_writer_ = std::move(writer).value();
+    states_ = std::make_unique<Outbox<Outgoing>>(
+        kStatesWaiting, [this](Outgoing&& outgoing) { Publish(std::move(outgoing)); });
+
+    Result<std::unique_ptr<ircp::ControlServer>> control = ircp::ControlServer::Create(
+        bus, clock_, kProgram,
+        [this](const ircp::CommandSample& command) { return Obey(command); });
+    if (!control) return control.error();
+    control_ = std::move(control).value();
+    control_->SetSentCounts([this] { return SentCounts(); });
+    control_->SetValues([this] { return Values(); });
+    control_->SetState("running", NameOf(Follower::Mode::kHolding));
+
+    Result<std::unique_ptr<ircp::Reader>> reader =
+        options_.leader == Leader::kCommand
+            ? bus.MakeReader<ircp::JointCommandSample>(
+                  [this](const ircp::JointCommandSample& s, const ircp::Reception&) {
+                    Receive({s.header, s.names, s.positions, s.velocities, s.validity,
+                             s.has_hand_open, s.hand_open});
+                  })
+            : bus.MakeReader<ircp::SuitSample>(
+                  [this](const ircp::SuitSample& s, const ircp::Reception&) {
+                    Receive({s.header, s.names, s.positions, {}, Duration(0), false, 0});
+                  });
+    if (!reader) return reader.error();
+    leader_reader_ = std::move(reader).value();
+    return {};
+  }
+
+  void Run(std::stop_token stop) override {
+    log_.Info("running", {{"joints", joint_names_.size()},
+                          {"rate_hz", options_.rate_hz},
+                          {"follows", options_.leader == Leader::kSuit ? "suit" : "command"},
+                          {"cameras", cameras_ ? "on" : "off"}});
+    Duration begin = clock_.Steady() - world_.time();
+    Stamp epoch = clock_.Now() - world_.time();
+    while (!stop.stop_requested()) {
+      const Duration now = clock_.Steady() - begin;
+      if (now - world_.time() > kLargestLag) {
+        const Duration lag = now - world_.time();
+        begin += lag;
+        epoch = epoch + lag;
+        ++slips_;
+        log_.Warning("the world fell behind the clock", {{"by_s", ToSeconds(lag)}});
+      }
+      while (world_.time() + world_.step() <= clock_.Steady() - begin) Tick(epoch);
+      if (!clock_.SleepUntil(begin + world_.time() + world_.step(), stop)) break;
+    }
+    states_->Finish();
+    control_->SetState("stopped", "asked to stop");
+    log_.Info("stopped", {{"sim_time_s", ToSeconds(world_.time())}});
+  }
+
+ private:
+  // ---- the loop
+
+  void Tick(Stamp epoch) {
+    const std::lock_guard lock(mutex_);
+    TakeSamples();
+    const Follower::Output target = follower_.At(world_.time() + world_.step());
+    world_.SetTarget(target.positions, target.velocities);
+    world_.Step();
+    SayClicks();
+    const Stamp stamp = epoch + world_.time();
+    if (ToSeconds(world_.time()) * options_.rate_hz >= static_cast<double>(states_due_)) {
+      ++states_due_;
+      states_->Put({State(stamp), follower_.mode()});
+    }
+    if (cameras_) cameras_->Look(world_, stamp);
+  }
+
+  void TakeSamples() {
+    std::deque<Arrival> arrivals;
+    {
+      const std::lock_guard lock(inbox_mutex_);
+      arrivals.swap(inbox_);
+    }
+    for (const Arrival& arrival : arrivals) {
+      std::optional<Setpoint> setpoint = MapOntoJoints(arrival);
+      if (!setpoint) {
+        ++refused_;
+        continue;
+      }
+      if (arrival.has_hand_open) hand_open_ = std::clamp(arrival.hand_open, 0.0, 1.0);
+      if (options_.leader == Leader::kSuit) {
+        follower_.Stream(world_.time(), std::move(*setpoint));
+      } else {
+        follower_.Command(world_.time(), std::move(*setpoint), arrival.validity);
+      }
+    }
+  }
+
+  /// Joints that the sample does not name stay where they were told to be; names that the robot
+  /// lacks do not matter, but one at least must fit.
+  std::optional<Setpoint> MapOntoJoints(const Arrival& arrival) const {
+    if (!IsSound(arrival)) return std::nullopt;
+    Setpoint setpoint;
+    setpoint.positions = follower_.last().positions;
+    setpoint.stamp = arrival.header.stamp;
+    setpoint.seq = arrival.header.seq;
+    if (!arrival.velocities.empty()) {
+      setpoint.velocities = Eigen::VectorXd::Zero(setpoint.positions.size());
+    }
+    bool fits = false;
+    for (std::size_t i = 0; i < arrival.names.size(); ++i) {
+      const auto it = std::find(joint_names_.begin(), joint_names_.end(), arrival.names[i]);
+      if (it == joint_names_.end()) continue;
+      fits = true;
+      const Eigen::Index joint = it - joint_names_.begin();
+      setpoint.positions[joint] = arrival.positions[i];
+      if (!arrival.velocities.empty()) setpoint.velocities[joint] = arrival.velocities[i];
+    }
+    if (!fits) return std::nullopt;
+    return setpoint;
+  }
+
+  void SayClicks() {
+    const std::vector<ButtonState> buttons = world_.buttons();
+    for (std::size_t i = 0; i < buttons.size(); ++i) {
+      if (buttons[i].clicks == clicks_[i]) continue;
+      clicks_[i] = buttons[i].clicks;
+      log_.Info("button clicked", {{"button", buttons[i].name},
+                                   {"clicks", buttons[i].clicks},
+                                   {"sim_time_s", ToSeconds(buttons[i].last_click)},
+                                   {"touch_n", world_.touch_n()}});
+    }
+  }
+
+  /// On the thread that may wait for the network.
+  void Publish(Outgoing&& outgoing) {
+    if (outgoing.mode != said_mode_) {
+      said_mode_ = outgoing.mode;
+      control_->SetState("running", NameOf(said_mode_));
+    }
+    if (Status status = state_writer_->Write(std::move(outgoing.state)); !status) {
+      log_.Warning("joint state not sent", {{"cause", status.error().message}});
+    }
+  }
+
+  ircp::JointStateSample State(Stamp stamp) const {
+    ircp::JointStateSample sample;
+    sample.header.stamp = stamp;
+    sample.names = joint_names_;
+    const auto list = [](const Eigen::VectorXd& v) {
+      return std::vector<double>(v.data(), v.data() + v.size());
+    };
+    sample.positions = list(world_.positions());
+    sample.velocities = list(world_.velocities());
+    sample.efforts = list(world_.efforts());
+    sample.hand_open = hand_open_;
+    sample.touch_sensors = {kTouchSensor};
+    sample.touch_n = {world_.touch_n()};
+    sample.command_seq = follower_.acted_seq();
+    return sample;
+  }
+
+  // ---- what the network's threads call
+
+  void Receive(Arrival arrival) {
+    const std::lock_guard lock(inbox_mutex_);
+    if (inbox_.size() >= kSamplesWaiting) {
+      inbox_.pop_front();  // The newest matters.
+      ++overrun_;
+    }
+    inbox_.push_back(std::move(arrival));
+  }
+
+  ircp::Answer Obey(const ircp::CommandSample& command) {
+    const std::lock_guard lock(mutex_);
+    if (command.action == "place") return Place(command.arguments);
+    if (command.action == "home") {
+      const Duration length = follower_.GoTo(world_.time(), home_);
+      return {true, "on the way home", {{"seconds", FormatDouble(ToSeconds(length))}}};
+    }
+    if (command.action == "reset_clicks") {
+      world_.ResetClicks();
+      std::fill(clicks_.begin(), clicks_.end(), 0);
+      return {true, "clicks are 0", {}};
+    }
+    return {false, "\"" + command.action + "\" is no action; place, home and reset_clicks are", {}};
+  }
+
+  ircp::Answer Place(const std::map<std::string, std::string>& arguments) {
+    const auto object = arguments.find("object");
+    if (object == arguments.end()) return {false, "object is missing", {}};
+    const Result<geometry::Pose> before = world_.ThingPose(object->second);
+    if (!before) return {false, before.error().message, {}};
+    const Result<geometry::Pose> pose = ReadPose(arguments, *before);
+    if (!pose) return {false, pose.error().message, {}};
+    if (Status status = world_.Place(object->second, *pose); !status) {
+      return {false, status.error().message, {}};
+    }
+    log_.Info("placed", {{"object", object->second}, {"pose", PoseText(*pose)}});
+    return {true, "placed", {{"pose", PoseText(*pose)}}};
+  }
+
+  std::vector<ircp::TopicCount> SentCounts() const {
+    std::vector<ircp::TopicCount> counts;
+    if (cameras_) counts = cameras_->sent();
+    counts.push_back({ircp::JointStateSample::kTopic, "robot", state_writer_->sent()});
+    return counts;
+  }
+
+  std::map<std::string, std::string> Values() const {
+    std::map<std::string, std::string> values;
+    {
+      const std::lock_guard lock(inbox_mutex_);
+      values["samples_overrun"] = std::to_string(overrun_);
+    }
+    const std::lock_guard lock(mutex_);
+    values["sim_time_s"] = FormatFixed(ToSeconds(world_.time()), 3);
+    values["mode"] = NameOf(follower_.mode());
+    values["touch_n"] = FormatFixed(world_.touch_n(), 3);
+    values["samples_refused"] = std::to_string(refused_);
+    values["stale"] = std::to_string(follower_.stale_count());
+    values["slips"] = std::to_string(slips_);
+    values["faults"] = std::to_string(world_.faults());
+    values["states_dropped"] = std::to_string(states_->dropped());
+    values["pictures_skipped"] = std::to_string(cameras_ ? cameras_->skipped() : 0);
+    for (const ButtonState& button : world_.buttons()) {
+      values["clicks." + button.name] = std::to_string(button.clicks);
+      values["position." + button.name] = PoseText(button.base_T_object);
+      if (button.clicks > 0) {
+        values["last_click_s." + button.name] = FormatFixed(ToSeconds(button.last_click), 3);
+      }
+    }
+    return values;
+  }
+
+  const Clock& clock_;
+  Log& log_;
+  const SessionOptions options_;
+  const std::vector<std::string> joint_names_;
+  const Eigen::VectorXd home_;
+
+  mutable std::mutex mutex_;  ///< guards the world and what moves with it
+  World world_;
+  Follower follower_;
+  std::vector<std::uint64_t> clicks_;  ///< said so far, by button
+  double hand_open_ = 1;
+  std::int64_t states_due_ = 0;
+  std::uint64_t refused_ = 0;
+  std::uint64_t slips_ = 0;
+
+  mutable std::mutex inbox_mutex_;
+  std::deque<Arrival> inbox_;
+  std::uint64_t overrun_ = 0;
+
+  std::unique_ptr<Cameras> cameras_;
+  std::unique_ptr<ircp::Writer<ircp::JointStateSample>> state_writer_;
+  std::unique_ptr<Outbox<Outgoing>> states_;
+  Follower::Mode said_mode_ = Follower::Mode::kHolding;  ///< of the outbox's thread
+  // Last: their threads call into what stands above.
+  std::unique_ptr<ircp::ControlServer> control_;
+  std::unique_ptr<ircp::Reader> leader_reader_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& clock, Log& log,
+                                                 const kinematics::RobotDescription& robot,
+                                                 const scene::Description& scene,
+                                                 const SessionOptions& options) {
+  if (!(options.rate_hz > 0) || options.rate_hz > 1 / ToSeconds(options.world.step)) {
+    return InvalidArgument(
+        "rate is " + FormatDouble(options.rate_hz) + " Hz, must be above 0 and at most one a step",
+        "rate-hz");
+  }
+  Result<World> world = World::Create(robot, scene, options.world);
+  if (!world) return world.error();
+  auto session =
+      std::make_unique<RunningSession>(clock, log, robot, options, std::move(world).value());
+  if (Status status = session->Connect(bus, scene); !status) return status.error();
+  return std::unique_ptr<Session>(std::move(session));
+}
+
+}  // namespace exemplar::simulator

@@ -1,0 +1,54 @@
+#pragma once
+// The simulated robot as its neighbours on the network know it: it follows joint commands (or a
+// person's suit), says where its joints are and what its finger feels, shows what its cameras see.
+
+#include <memory>
+#include <stop_token>
+
+#include "exemplar/base/clock.hpp"
+#include "exemplar/base/log.hpp"
+#include "exemplar/base/result.hpp"
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/scene/description.hpp"
+#include "simulator/follower.hpp"
+#include "simulator/world.hpp"
+
+namespace exemplar::simulator {
+
+/// Whom the robot follows.
+enum class Leader { kCommand, kSuit };
+
+struct SessionOptions {
+  Leader leader = Leader::kCommand;
+  double rate_hz = 125;  ///< of ircp/joint_state
+  bool cameras = true;
+  /// "jpeg" or "png", and the former's quality.
+  std::string picture_encoding = "jpeg";
+  int picture_quality = 95;
+  WorldOptions world = {};
+  FollowerOptions follower = {};
+};
+
+/// Name of the touch sensor on ircp/joint_state: the sum over the robot's touch links.
+inline constexpr const char* kTouchSensor = "finger";
+
+/// Commands it answers (ircp/control.hpp, program "simulator"):
+///   place{object, x, y [, z] [, qx, qy, qz, qw]}  what is left out stays as it is
+///   home{}           back to the home posture at a gentle speed; the answer's `seconds` says when
+///   reset_clicks{}
+/// Its status carries `sim_time_s`, `mode`, `clicks.<button>`, `last_click_s.<button>`,
+/// `position.<button>` ("x,y,z,qx,qy,qz,qw") and counts of what went wrong.
+class Session {
+ public:
+  /// `bus`, `clock` and `log` outlive the session.
+  static Result<std::unique_ptr<Session>> Create(ircp::Bus& bus, const Clock& clock, Log& log,
+                                                 const kinematics::RobotDescription& robot,
+                                                 const scene::Description& scene,
+                                                 const SessionOptions& options = {});
+  virtual ~Session() = default;
+  /// Steps the world in pace with the clock until `stop`. Call once.
+  virtual void Run(std::stop_token stop) = 0;
+};
+
+}  // namespace exemplar::simulator
