@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "exemplar/base/text.hpp"
+
 namespace exemplar::learning {
 namespace {
 
@@ -15,6 +17,21 @@ double SubsetPairs(const Shortlist& list) {
     squares += subsets * subsets;
   }
   return (sum * sum - squares) / 2;
+}
+
+std::string Describe(std::span<const MarkerCandidates> trials, const Shortlist& list) {
+  constexpr std::size_t kMostNamed = 5;
+  std::vector<std::string> cut;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const std::size_t all = trials[i].time_s.size();
+    if (list.kept[i].size() == all) continue;
+    cut.push_back("trial " + trials[i].id + " (" + std::to_string(list.kept[i].size()) + " of " +
+                  std::to_string(all) + ")");
+  }
+  const std::size_t more = cut.size() - std::min(cut.size(), kMostNamed);
+  cut.resize(cut.size() - more);
+  return "to bound the work only the clearest candidate markers took part in the choice: " +
+         Join(cut, ", ") + (more > 0 ? " and " + std::to_string(more) + " trials more" : "");
 }
 
 double LeastGap(const MarkerCandidates& trial, const Subset& subset) {
@@ -75,14 +92,7 @@ Shortlist MakeShortlist(std::span<const MarkerCandidates> trials, double max_sub
     }));
     list.complete = false;
   }
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    const std::size_t all = trials[i].time_s.size();
-    if (list.kept[i].size() == all) continue;
-    list.warnings.push_back("trial " + trials[i].id + ": only the " +
-                            std::to_string(list.kept[i].size()) + " clearest of " +
-                            std::to_string(all) +
-                            " candidate markers took part in the choice, to bound the work");
-  }
+  if (!list.complete) list.warnings.push_back(Describe(trials, list));
   return list;
 }
 

@@ -22,7 +22,7 @@ struct Shortlist {
   std::size_t size = 0;                ///< N_min
   std::vector<std::vector<int>> kept;  ///< [trial]: ascending
   bool complete = true;                ///< nobody was left out
-  std::vector<std::string> warnings;   ///< one for each trial that lost candidates
+  std::vector<std::string> warnings;   ///< who lost candidates
 };
 Shortlist MakeShortlist(std::span<const MarkerCandidates> trials, double max_subset_pairs);
 

@@ -20,11 +20,14 @@ Biquad Butterworth(double cutoff_part) {
   return {b0, 2 * b0, b0, 2 * (k * k - 1) * norm, (1 - std::numbers::sqrt2 * k + k * k) * norm};
 }
 
-// In place, all channels (columns of the transposed layout: one column a sample), starting as if
-// the first sample had stood for ever.
-void Run(const Biquad& f, Eigen::MatrixXd& x) {
-  Eigen::VectorXd z1 = (1 - f.b0) * x.col(0);
-  Eigen::VectorXd z2 = (f.b2 - f.a2) * x.col(0);
+// In place, all channels (one column a sample), starting as if the input had come along the line
+// through sample 0 with `slope` a sample for ever: the output follows it by the filter's delay.
+void Run(const Biquad& f, const Eigen::VectorXd& slope, Eigen::MatrixXd& x) {
+  const double gain = 1 + f.a1 + f.a2;
+  const double delay = (f.b1 + 2 * f.b2 - f.a1 - 2 * f.a2) / gain;
+  const Eigen::VectorXd first = x.col(0) - delay * slope;
+  Eigen::VectorXd z1 = first - f.b0 * x.col(0);
+  Eigen::VectorXd z2 = first + slope - f.b0 * (x.col(0) + slope) - f.b1 * x.col(0) + f.a1 * first;
   Eigen::VectorXd y(x.rows());
   for (Eigen::Index k = 0; k < x.cols(); ++k) {
     y = f.b0 * x.col(k) + z1;
@@ -55,9 +58,12 @@ Eigen::MatrixXd LowPass(const Eigen::Ref<const Eigen::MatrixXd>& samples, double
     x.col(pad - k) = 2 * samples.row(0) - samples.row(k);
     x.col(pad + n - 1 + k) = 2 * samples.row(n - 1) - samples.row(n - 1 - k);
   }
-  Run(filter, x);
+  const auto mean_slope = [&]() -> Eigen::VectorXd {
+    return (x.col(pad) - x.col(0)) / static_cast<double>(pad);
+  };
+  Run(filter, mean_slope(), x);
   x = x.rowwise().reverse().eval();
-  Run(filter, x);
+  Run(filter, mean_slope(), x);
   return x.rowwise().reverse().middleCols(pad, n).transpose();
 }
 
