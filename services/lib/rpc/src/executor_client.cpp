@@ -27,6 +27,7 @@ class ExecutorClient final : public api::ExecutorApi {
       std::stop_token stop) override {
     v1::ExecuteRequest request;
     ToProto(execution, request.mutable_execution());
+    request.set_detached(execution.detached);
     const auto context = connection_->Begin(Connection::Length::kLong);
     const CancelOnStop cancel(*context, std::move(stop));
     const auto reader = stub_.Execute(context.get(), request);

@@ -114,7 +114,10 @@ struct ExecuteRequest {
   std::vector<geometry::NamedPose> objects;  ///< empty: as seen on ircp/objects
   /// Where the motion is to begin; the robot goes there first. Absent: where the tool is now.
   std::optional<geometry::Pose> start;
-  double speed = 1.0;                        ///< 0 < speed <= 1
+  double speed = 1.0;  ///< 0 < speed <= 1
+  /// For callers over the network: Execute returns once the robot moves (the result's state says
+  /// so), and the end of the call does not end the motion. Implementations need not look at it.
+  bool detached = false;
 };
 
 struct PlanSummary {
