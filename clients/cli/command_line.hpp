@@ -1,0 +1,82 @@
+#pragma once
+// Commands with subcommands, on CLI11, which only command_line.cpp includes.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace exemplar::cli {
+
+/// The exit code of bad usage.
+inline constexpr int kUsage = 2;
+
+/// A command or a group of commands. A handle: cheap to copy; its CommandLine must outlive it, and
+/// so must the variables that options are bound to.
+class Command {
+ public:
+  /// A subcommand. `examples` end its --help, one a line.
+  Command Add(const std::string& name, const std::string& summary,
+              const std::vector<std::string>& examples = {});
+
+  /// Words without dashes, in order: "NAME" must be given.
+  Command& Argument(const std::string& name, std::string& value, const std::string& help);
+  Command& OptionalArgument(const std::string& name, std::string& value, const std::string& help);
+  Command& Arguments(const std::string& name, std::vector<std::string>& values,
+                     const std::string& help);
+  /// `name` with dashes; `type` as --help shows its value. The variable's value is the default.
+  Command& Option(const std::string& name, const std::string& type, std::string& value,
+                  const std::string& help);
+  Command& Option(const std::string& name, const std::string& type, std::optional<double>& value,
+                  const std::string& help);
+  Command& Option(const std::string& name, const std::string& type, int& value,
+                  const std::string& help);
+  /// May be given several times, one value each.
+  Command& Option(const std::string& name, const std::string& type,
+                  std::vector<std::string>& values, const std::string& help);
+  Command& Flag(const std::string& name, bool& value, const std::string& help);
+
+  // Of the option added last:
+  Command& Required();
+  Command& OneOf(const std::vector<std::string>& choices);
+  Command& FromEnvironment(const std::string& variable);
+
+  /// What the command does: returns the exit code.
+  void Runs(std::function<int()> action);
+
+ private:
+  friend class CommandLine;
+  Command(CLI::App* app, std::function<int()>* chosen) : app_(app), chosen_(chosen) {}
+
+  CLI::App* app_;
+  std::function<int()>* chosen_;
+  CLI::Option* last_ = nullptr;
+};
+
+class CommandLine {
+ public:
+  CommandLine(const std::string& program, const std::string& summary, const std::string& version,
+              const std::vector<std::string>& examples);
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  /// Options added here may stand before and after the commands.
+  Command& root() { return root_; }
+  /// Parses, and does what the command does. --help and --version print to stdout; what is wrong
+  /// with the words goes to stderr, with the nearest right one.
+  int Run(int argc, char** argv);
+
+ private:
+  std::unique_ptr<CLI::App> app_;
+  std::function<int()> chosen_;
+  Command root_;
+};
+
+}  // namespace exemplar::cli

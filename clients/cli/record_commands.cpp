@@ -1,0 +1,101 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "exemplar/base/text.hpp"
+#include "screen.hpp"
+#include "values.hpp"
+
+namespace exemplar::cli {
+namespace {
+
+std::string StatusText(const api::RecorderStatus& status) {
+  std::string text = "state     " + status.state +
+                     (status.detail.empty() ? "" : " (" + status.detail + ")") + '\n';
+  if (!status.file.empty()) {
+    text += "file      " + status.file + "\nrecorded  " + FormatFixed(status.duration_s, 2) +
+            " s, " + std::to_string(status.messages) + " messages, " +
+            FormatFixed(1e-6 * static_cast<double>(status.bytes), 2) + " MB\n";
+  }
+  if (status.topics.empty()) return text;
+  Table topics({"TOPIC", "SENT", "RECEIVED", "LOST", "HZ", "WRITERS", "TYPE"});
+  for (const api::TopicFigures& topic : status.topics) {
+    topics.Add({topic.topic, std::to_string(topic.sent), std::to_string(topic.received),
+                std::to_string(topic.lost), FormatFixed(topic.rate_hz, 1),
+                std::to_string(topic.writers),
+                topic.type + (topic.has_schema ? "" : " (no schema)")});
+  }
+  return text + topics.Text();
+}
+
+int Do(const Session& session, const std::string& format,
+       const std::function<Result<api::RecorderStatus>(api::RecorderApi&)>& action) {
+  const Result<rpc::Clients> clients = session.Connect();
+  if (!clients) return FailUsage(clients.error());
+  const Result<api::RecorderStatus> status = action(*clients->recorder);
+  if (!status) return Fail(status.error());
+  if (format == "json") {
+    Print(ToJson(*status));
+  } else {
+    std::cout << StatusText(*status);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddRecordCommands(Command& root, const Session& session) {
+  Command record = root.Add("record", "Recordings of a station's topics, as MCAP files");
+
+  struct StartWords {
+    std::string name, format;
+    std::vector<std::string> metadata, topics;
+    std::optional<double> wait_s;
+  };
+  const auto words = std::make_shared<StartWords>();
+  Command command = record.Add("start", "Begins a file",
+                               {"exemplar record start --name trial-001 --meta person=anna",
+                                "exemplar record start --topic ircp/suit --topic ircp/objects"});
+  command.Option("--name", "NAME", words->name, "of the file (default: made from the time)");
+  command.Option("--meta", "NAME=VALUE", words->metadata, "kept in the file; several times");
+  command.Option("--topic", "TOPIC", words->topics, "wait until it has a writer; several times");
+  command.Option("--wait", "SECONDS", words->wait_s, "limit of that wait (default: 5)");
+  AddFormat(command, words->format, {"text", "json"});
+  command.Runs([&session, words] {
+    const auto metadata = ParsePairs(words->metadata, "--meta");
+    if (!metadata) return FailUsage(metadata.error());
+    api::RecordStart start;
+    start.name = words->name;
+    start.metadata = *metadata;
+    start.expected_topics = words->topics;
+    if (words->wait_s) start.timeout_s = *words->wait_s;
+    return Do(session, words->format,
+              [&](api::RecorderApi& recorder) { return recorder.Start(start); });
+  });
+
+  struct Action {
+    const char* name;
+    const char* summary;
+    Result<api::RecorderStatus> (api::RecorderApi::*call)();
+  };
+  for (const Action& action :
+       {Action{"stop", "Ends the file: it is whole and on the disk when this returns",
+               &api::RecorderApi::Stop},
+        Action{"pause", "Leaves out what comes until resume", &api::RecorderApi::Pause},
+        Action{"resume", "Goes on with a paused recording", &api::RecorderApi::Resume},
+        Action{"status", "Shows state, file, and what each topic sent and lost",
+               &api::RecorderApi::GetStatus}}) {
+    const auto format = std::make_shared<std::string>();
+    command =
+        record.Add(action.name, action.summary, {std::string("exemplar record ") + action.name});
+    AddFormat(command, *format, {"text", "json"});
+    command.Runs([&session, format, call = action.call] {
+      return Do(session, *format,
+                [call](api::RecorderApi& recorder) { return (recorder.*call)(); });
+    });
+  }
+  AddRecordingFileCommands(record);
+}
+
+}  // namespace exemplar::cli

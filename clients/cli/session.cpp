@@ -1,0 +1,96 @@
+#include "session.hpp"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "exemplar/base/text.hpp"
+#include "exemplar/program/runtime.hpp"
+
+namespace exemplar::cli {
+
+Result<rpc::Clients> Session::Connect() const {
+  rpc::ClientOptions options;
+  options.server = server;
+  if (timeout_s) {
+    constexpr double kLongest = 1e6;
+    if (!(*timeout_s > 0 && *timeout_s <= kLongest)) {
+      return InvalidArgument(
+          "--timeout is " + FormatDouble(*timeout_s) + " s, must be over 0 and at most 1000000",
+          "timeout");
+    }
+    options.timeout = FromSeconds(*timeout_s);
+    options.long_timeout = options.timeout;
+  }
+  return rpc::Connect(options);
+}
+
+int Fail(const Error& error) { return program::Fail("exemplar", error); }
+
+int FailUsage(const Error& error) {
+  program::Fail("exemplar", error);
+  return kUsage;
+}
+
+void Warn(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) {
+    std::cerr << "exemplar: warning: " << warning << '\n';
+  }
+}
+
+void AddFormat(Command& command, std::string& format, const std::vector<std::string>& formats) {
+  format = formats.front();
+  command.Option("--format", "", format, "how the answer is printed").OneOf(formats);
+}
+
+void Print(const nlohmann::json& json) {
+  std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+}
+
+Status Write(std::string_view text, const std::string& output) {
+  if (output.empty() || output == "-") {
+    std::cout << text << std::flush;
+    if (!std::cout) return Internal("stdout cannot be written");
+    return {};
+  }
+  const std::string part = output + ".part";
+  {
+    std::ofstream file(part, std::ios::binary | std::ios::trunc);
+    file << text;
+    file.flush();
+    if (!file) {
+      std::filesystem::remove(part);
+      return Internal(output + ": cannot be written");
+    }
+  }
+  std::error_code error;
+  std::filesystem::rename(part, output, error);
+  if (error) return Internal(output + ": " + error.message());
+  return {};
+}
+
+Result<std::string> ReadFile(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return NotFound("there is no file " + path, "file");
+  if (std::filesystem::is_directory(status)) {
+    return InvalidArgument(path + " is a folder, must be a file", "file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  // An empty file sets failbit on `bytes`: it is read nonetheless.
+  if (!file.is_open() || file.bad()) return InvalidArgument(path + ": cannot be read", "file");
+  return std::move(bytes).str();
+}
+
+std::string FileName(const std::string& path) {
+  return std::filesystem::path(path).filename().string();
+}
+
+}  // namespace exemplar::cli

@@ -1,0 +1,45 @@
+#pragma once
+// What all commands share: the server, the limits, and how things are said.
+
+#include <iosfwd>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "command_line.hpp"
+#include "exemplar/base/result.hpp"
+#include "exemplar/rpc/client.hpp"
+
+namespace exemplar::cli {
+
+/// The options that stand for every command.
+struct Session {
+  std::string server = "127.0.0.1:50051";
+  std::optional<double> timeout_s;
+
+  /// Errors: an address or a limit that is none.
+  Result<rpc::Clients> Connect() const;
+};
+
+/// Says "exemplar: what is wrong" on stderr; returns the contract's exit code.
+int Fail(const Error& error);
+/// The same for words of the command line that cannot be meant.
+int FailUsage(const Error& error);
+/// "exemplar: warning: ..." on stderr, one a line.
+void Warn(const std::vector<std::string>& warnings);
+
+/// Adds `--format` with the first of `formats` as default.
+void AddFormat(Command& command, std::string& format, const std::vector<std::string>& formats);
+
+void Print(const nlohmann::json& json);
+/// To stdout, or to a file that is written whole or not at all.
+Status Write(std::string_view text, const std::string& output);
+
+/// A file's bytes. kNotFound when there is none.
+Result<std::string> ReadFile(const std::string& path);
+/// The last part of a path.
+std::string FileName(const std::string& path);
+
+}  // namespace exemplar::cli
