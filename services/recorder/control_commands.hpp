@@ -1,0 +1,15 @@
+#pragma once
+#include "exemplar/api/services.hpp"
+#include "exemplar/ircp/control.hpp"
+
+namespace exemplar::recorder {
+
+/// Commands of ircp/recorder/command: "start" (arguments `name`, `meta.KEY`, `expect` as topics
+/// separated by commas, `timeout_s`; all optional), "stop", "pause", "resume", "status". The
+/// answer's values: `state`, `file`, `messages`, `bytes`, `duration_s`, `sent`, `received`, `lost`.
+ircp::Answer AnswerCommand(api::RecorderApi& recorder, const ircp::CommandSample& command);
+
+/// The same values, for the status topic.
+std::map<std::string, std::string> StatusValues(const api::RecorderStatus& status);
+
+}  // namespace exemplar::recorder

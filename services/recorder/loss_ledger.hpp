@@ -1,0 +1,77 @@
+#pragma once
+// Who sent how much, and what of it is missing. Losses are counted from numbers, never guessed.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "exemplar/api/services.hpp"
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/sequence_set.hpp"
+#include "recorder/sample_header.hpp"
+
+namespace exemplar::recorder {
+
+/// One writer of one topic, since the first sample that came from it.
+struct WriterFigures {
+  std::string topic;
+  std::string writer;  ///< its identity on the network
+  std::string source;  ///< its name in the samples; empty for strangers' types
+  std::uint64_t received = 0;
+  std::uint64_t lost_in_gaps = 0;  ///< numbers missing between those that came
+  std::uint64_t lost_at_end = 0;   ///< announced by the writer, behind the last one that came
+  std::uint64_t dropped = 0;       ///< came, but the recorder's own queue was full
+  std::uint64_t last = 0;          ///< highest number that came
+  std::optional<std::uint64_t> announced;  ///< the last number it said to have sent
+
+  std::uint64_t lost() const { return lost_in_gaps + lost_at_end + dropped; }
+};
+
+/// What happened between two looks at the same ledger.
+std::vector<WriterFigures> Difference(const std::vector<WriterFigures>& now,
+                                      const std::vector<WriterFigures>& before);
+
+/// Thread-compatible.
+class LossLedger {
+ public:
+  void AddTopic(const ircp::RawTopic& topic);
+  const ircp::RawTopic* FindTopic(const std::string& topic) const;
+
+  /// `header` where the type has one: its numbers count, else those of the protocol. Samples that
+  /// only end an instance use up a number of the protocol and none of the header.
+  void AddReceived(const ircp::RawSample& sample, const std::optional<SampleHeader>& header,
+                   Duration steady_now);
+  void AddDropped(const std::string& topic, const std::string& writer);
+  /// From a status sample of the participant that `status_writer` belongs to.
+  void AddAnnounced(const std::string& status_writer, const ircp::TopicCount& count);
+
+  std::vector<WriterFigures> writers() const;
+  /// Whether everything that was announced by writers seen here has come or is known as lost.
+  bool HasAllAnnounced() const;
+  /// `writers_now` of a topic come from the network.
+  std::vector<api::TopicFigures> TopicFigures(Duration steady_now) const;
+
+ private:
+  struct WriterEntry {
+    std::string source;
+    ircp::SequenceSet sequences;
+    std::uint64_t dropped = 0;
+    std::uint64_t ended_instances = 0;
+  };
+  struct TopicEntry {
+    ircp::RawTopic topic;
+    std::map<std::string, WriterEntry> writers;
+    Duration window_start{0};
+    std::uint64_t in_window = 0;
+    double rate_hz = 0;
+  };
+  WriterFigures FiguresOf(const std::string& topic, const std::string& writer,
+                          const WriterEntry& entry) const;
+
+  std::map<std::string, TopicEntry> topics_;
+  /// By topic, participant and source.
+  std::map<std::tuple<std::string, std::string, std::string>, std::uint64_t> announced_;
+};
+
+}  // namespace exemplar::recorder

@@ -1,0 +1,493 @@
+#include "recorder/recorder.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <mutex>
+#include <span>
+#include <thread>
+
+#include "exemplar/recording/file.hpp"
+#include "recorder/loss_ledger.hpp"
+#include "recorder/recording_file.hpp"
+#include "recorder/state.hpp"
+
+namespace exemplar::recorder {
+namespace {
+
+constexpr Duration kPoll = std::chrono::milliseconds(10);
+constexpr Duration kLossInterval = std::chrono::seconds(1);
+constexpr std::size_t kLongestName = 200;
+
+struct Arrival {
+  ircp::RawSample sample;
+  std::string source;
+};
+
+/// 20261122T032433.123Z
+std::string NameFromTime(Stamp stamp) {
+  std::string name;
+  for (const char c : ToIso8601(stamp)) {
+    if (c != '-' && c != ':') name += c;
+  }
+  return name;
+}
+
+class RecorderImpl final : public Recorder {
+ public:
+  RecorderImpl(const Clock& clock, Log& log, StatusDecoder decode_status, RecorderOptions options)
+      : clock_(clock),
+        log_(log),
+        decode_status_(std::move(decode_status)),
+        options_(std::move(options)) {}
+
+  ~RecorderImpl() override {
+    if (HasFile()) {
+      if (const Result<api::RecorderStatus> stopped = Stop(); !stopped.ok()) {
+        log_.Error("recording not closed", {{"error", stopped.error().message}});
+      }
+    }
+    tap_.reset();  // no callback comes after this
+  }
+
+  Status Open(ircp::RawBus& bus) {
+    ircp::RawTapOptions tap;
+    tap.wanted = options_.wanted;
+    tap.on_topic = [this](const ircp::RawTopic& topic) { OnTopic(topic); };
+    tap.on_sample = [this](ircp::RawSample&& sample) { OnSample(std::move(sample)); };
+    Result<std::unique_ptr<ircp::RawTap>> made = bus.MakeTap(std::move(tap));
+    if (!made.ok()) return made.error();
+    tap_ = std::move(*made);
+    {
+      const std::lock_guard lock(mutex_);
+      const Result<State> next = Next(state_, Event::kOpen);
+      if (!next.ok()) return next.error();
+      state_ = *next;
+      detail_ = "listening";
+    }
+    writer_thread_ = std::jthread([this](std::stop_token stop) { WriteLoop(std::move(stop)); });
+    return {};
+  }
+
+  Result<api::RecorderStatus> Start(const api::RecordStart& request) override {
+    const std::lock_guard control(control_mutex_);
+    {
+      const std::lock_guard lock(mutex_);
+      if (const Result<State> next = Next(state_, Event::kStart); !next.ok()) return next.error();
+    }
+    const Stamp now = clock_.Now();
+    const std::string name = request.name.empty() ? NameFromTime(now) : request.name;
+    if (const Status valid = CheckRecordingName(name); !valid.ok()) return valid.error();
+    if (const Status there = AwaitWriters(request); !there.ok()) return there.error();
+
+    const std::filesystem::path path = options_.data_dir / (name + ".mcap");
+    Result<std::unique_ptr<recording::FileSink>> sink = recording::FileSink::Create(path);
+    if (!sink.ok()) return sink.error();
+    Result<std::unique_ptr<RecordingFile>> file = RecordingFile::Create(
+        **sink, options_.file, {name, options_.station, now, request.metadata});
+    if (!file.ok()) return file.error();
+    {
+      const std::lock_guard lock_file(file_mutex_);
+      sink_ = std::move(*sink);
+      file_ = std::move(*file);
+      last_flush_ = clock_.Steady();
+      last_losses_ = last_flush_;
+      losses_written_ = 0;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      state_ = State::kRecording;
+      detail_ = "recording " + name;
+      path_ = path.string();
+      failure_.reset();
+      at_start_ = ledger_.writers();
+      recorded_before_ = Duration(0);
+      recording_since_ = clock_.Steady();
+      messages_ = 0;
+      bytes_ = 0;
+    }
+    log_.Info("recording", {{"file", path.string()}});
+    return Changed();
+  }
+
+  Result<api::RecorderStatus> Stop() override {
+    const std::lock_guard control(control_mutex_);
+    bool stopped_already = false;
+    {
+      const std::lock_guard lock(mutex_);
+      const Result<State> next = Next(state_, Event::kStop);
+      if (!next.ok()) return next.error();
+      if (failure_) return *failure_;
+      stopped_already = state_ == State::kStopped;
+    }
+    if (stopped_already) return Snapshot();
+    Settle();
+    std::vector<WriterFigures> losses;
+    {
+      std::unique_lock lock(mutex_);
+      if (failure_) return *failure_;
+      SetStateLocked(State::kStopped, "closing");
+      drained_.wait(lock, [&] { return queue_.empty() && !writing_; });
+      losses = Difference(ledger_.writers(), at_start_);
+    }
+    Status finished;
+    {
+      const std::lock_guard lock_file(file_mutex_);
+      if (file_ != nullptr) {
+        finished = file_->Finish(clock_.Now(), losses);
+        const std::lock_guard lock(mutex_);
+        messages_ = file_->messages();
+        bytes_ = file_->bytes();
+      }
+      file_.reset();
+      sink_.reset();
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      if (failure_) finished = *failure_;
+      detail_ = finished.ok() ? "recorded " + std::to_string(messages_) + " messages"
+                              : finished.error().message;
+      log_.Info("recorded", {{"file", path_},
+                             {"messages", messages_},
+                             {"bytes", bytes_},
+                             {"lost", TotalLost(losses)}});
+    }
+    const api::RecorderStatus status = Changed();
+    if (!finished.ok()) return finished.error();
+    return status;
+  }
+
+  Result<api::RecorderStatus> Pause() override { return Switch(Event::kPause, "paused"); }
+  Result<api::RecorderStatus> Resume() override { return Switch(Event::kResume, "recording"); }
+
+  Result<api::RecorderStatus> GetStatus() override { return Snapshot(); }
+
+ private:
+  static std::uint64_t TotalLost(const std::vector<WriterFigures>& writers) {
+    std::uint64_t lost = 0;
+    for (const WriterFigures& writer : writers) lost += writer.lost();
+    return lost;
+  }
+
+  // ---- on threads of the network
+
+  void OnTopic(const ircp::RawTopic& topic) {
+    {
+      const std::lock_guard lock(mutex_);
+      ledger_.AddTopic(topic);
+    }
+    if (topic.schema.empty()) {
+      log_.Warning("topic without schema: its bytes are recorded as they are",
+                   {{"topic", topic.topic}, {"type", topic.type}});
+    }
+  }
+
+  void OnSample(ircp::RawSample&& sample) {
+    bool has_header = false;
+    bool is_status = false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (const ircp::RawTopic* topic = ledger_.FindTopic(sample.topic)) {
+        has_header = topic->type.starts_with("exemplar::ircp::");
+        is_status = has_header && topic->type.ends_with("::Status");
+      }
+    }
+    std::optional<SampleHeader> header;
+    if (has_header && sample.valid) header = ReadSampleHeader(sample.cdr);
+    std::vector<ircp::TopicCount> announced;
+    if (is_status && sample.valid) {
+      Result<ircp::StatusSample> status = decode_status_(sample.cdr);
+      if (status.ok()) announced = std::move(status->sent);
+    }
+    const std::lock_guard lock(mutex_);
+    ledger_.AddReceived(sample, header, clock_.Steady());
+    for (const ircp::TopicCount& count : announced) ledger_.AddAnnounced(sample.writer, count);
+    if (state_ != State::kRecording || !sample.valid) return;
+    if (queue_bytes_ + sample.cdr.size() > options_.queue_bytes) {
+      ledger_.AddDropped(sample.topic, sample.writer);
+      return;
+    }
+    queue_bytes_ += sample.cdr.size();
+    queue_.push_back({std::move(sample), header ? std::move(header->source) : std::string()});
+    arrived_.notify_one();
+  }
+
+  // ---- on the writer's thread
+
+  void WriteLoop(std::stop_token stop) {
+    while (true) {
+      std::deque<Arrival> batch;
+      {
+        std::unique_lock lock(mutex_);
+        arrived_.wait_for(lock, stop, options_.flush_interval / 2, [&] { return !queue_.empty(); });
+        if (stop.stop_requested() && queue_.empty()) return;
+        batch.swap(queue_);
+        writing_ = true;
+      }
+      const std::size_t written_bytes = WriteBatch(batch);
+      {
+        const std::lock_guard lock(mutex_);
+        queue_bytes_ -= written_bytes;
+        writing_ = false;
+      }
+      drained_.notify_all();
+    }
+  }
+
+  std::size_t WriteBatch(const std::deque<Arrival>& batch) {
+    std::size_t bytes = 0;
+    for (const Arrival& arrival : batch) bytes += arrival.sample.cdr.size();
+    const std::lock_guard lock_file(file_mutex_);
+    if (file_ == nullptr) {
+      const std::lock_guard lock(mutex_);
+      for (const Arrival& lost : batch) ledger_.AddDropped(lost.sample.topic, lost.sample.writer);
+      return bytes;
+    }
+    for (auto arrival = batch.begin(); arrival != batch.end(); ++arrival) {
+      const Status written =
+          file_->Write(TopicOf(arrival->sample), arrival->source, arrival->sample);
+      if (written.ok()) continue;
+      {
+        const std::lock_guard lock(mutex_);
+        for (auto lost = arrival; lost != batch.end(); ++lost) {
+          ledger_.AddDropped(lost->sample.topic, lost->sample.writer);
+        }
+      }
+      Fail(written.error());
+      return bytes;
+    }
+    if (const Status kept = KeepPromises(); !kept.ok()) Fail(kept.error());
+    if (file_ != nullptr) {
+      const std::lock_guard lock(mutex_);
+      messages_ = file_->messages();
+      bytes_ = file_->bytes();
+    }
+    return bytes;
+  }
+
+  ircp::RawTopic TopicOf(const ircp::RawSample& sample) {
+    const std::lock_guard lock(mutex_);
+    const ircp::RawTopic* topic = ledger_.FindTopic(sample.topic);
+    if (topic != nullptr) return *topic;
+    ircp::RawTopic unknown;
+    unknown.topic = sample.topic;
+    return unknown;
+  }
+
+  /// Syncs, and notes new losses, when it is time. Precondition: file_mutex_ is held.
+  Status KeepPromises() {
+    const Duration now = clock_.Steady();
+    // Half of it, as a sample may have waited for the other half.
+    if (now - last_flush_ < options_.flush_interval / 2) return {};
+    last_flush_ = now;
+    if (now - last_losses_ >= kLossInterval) {
+      last_losses_ = now;
+      std::vector<WriterFigures> losses;
+      {
+        const std::lock_guard lock(mutex_);
+        losses = Difference(ledger_.writers(), at_start_);
+      }
+      std::erase_if(losses, [](const WriterFigures& writer) { return writer.lost() == 0; });
+      const std::uint64_t lost = TotalLost(losses);
+      if (lost != losses_written_) {
+        losses_written_ = lost;
+        if (const Status s = file_->WriteLosses(losses); !s.ok()) return s;
+      }
+    }
+    return file_->Flush();
+  }
+
+  /// Precondition: file_mutex_ is held.
+  void Fail(const Error& error) {
+    log_.Error("recording failed", {{"error", error.message}});
+    file_.reset();
+    sink_.reset();
+    {
+      const std::lock_guard lock(mutex_);
+      failure_ = error;
+      SetStateLocked(State::kStopped, "stopped by a failure: " + error.message +
+                                          "; what was written before is whole");
+    }
+    Changed();
+  }
+
+  // ---- on threads of callers
+
+  Status AwaitWriters(const api::RecordStart& request) {
+    if (request.timeout_s < 0 || !(request.timeout_s < 3600)) {
+      return InvalidArgument(
+          "timeout_s is " + std::to_string(request.timeout_s) + ", must lie between 0 and 3600",
+          "timeout_s");
+    }
+    const Duration deadline = clock_.Steady() + FromSeconds(request.timeout_s);
+    while (true) {
+      std::vector<std::string> missing;
+      for (const std::string& topic : request.expected_topics) {
+        if (tap_->matched_writers(topic) == 0) missing.push_back(topic);
+      }
+      if (missing.empty()) return {};
+      if (clock_.Steady() >= deadline) {
+        return Error{ErrorCode::kDeadlineExceeded,
+                     "no writer of " + Join(missing, ", ") + " after " +
+                         FormatDouble(request.timeout_s) + " s",
+                     "expected_topics"};
+      }
+      clock_.SleepFor(kPoll);
+    }
+  }
+
+  /// Waits for samples that were sent before the stop but have not come yet.
+  void Settle() {
+    const Duration deadline = clock_.Steady() + options_.settle_time;
+    do {
+      clock_.SleepFor(kPoll);
+      const std::lock_guard lock(mutex_);
+      if (ledger_.HasAllAnnounced()) return;
+    } while (clock_.Steady() < deadline);
+  }
+
+  Result<api::RecorderStatus> Switch(Event event, const std::string& detail) {
+    const std::lock_guard control(control_mutex_);
+    {
+      const std::lock_guard lock(mutex_);
+      const Result<State> next = Next(state_, event);
+      if (!next.ok()) return next.error();
+      if (*next != state_) SetStateLocked(*next, detail);
+    }
+    return Changed();
+  }
+
+  /// Precondition: mutex_ is held.
+  void SetStateLocked(State state, std::string detail) {
+    const Duration now = clock_.Steady();
+    if (state_ == State::kRecording) recorded_before_ += now - recording_since_;
+    recording_since_ = now;
+    state_ = state;
+    detail_ = std::move(detail);
+  }
+
+  bool HasFileLocked() const { return state_ == State::kRecording || state_ == State::kPaused; }
+  bool HasFile() {
+    const std::lock_guard lock(mutex_);
+    return HasFileLocked();
+  }
+
+  /// Precondition: mutex_ is held.
+  api::RecorderStatus StatusLocked() {
+    const Duration now = clock_.Steady();
+    api::RecorderStatus status;
+    status.state = ToString(state_);
+    status.detail = detail_;
+    status.file = path_;
+    Duration recorded = recorded_before_;
+    if (state_ == State::kRecording) recorded += now - recording_since_;
+    status.duration_s = ToSeconds(recorded);
+    status.messages = messages_;
+    status.bytes = bytes_;
+    status.topics = ledger_.TopicFigures(now);
+    return status;
+  }
+
+  /// The tap is asked without the lock: it calls back under locks of its own.
+  api::RecorderStatus Snapshot() {
+    api::RecorderStatus status;
+    {
+      const std::lock_guard lock(mutex_);
+      status = StatusLocked();
+    }
+    for (api::TopicFigures& topic : status.topics) {
+      topic.writers = tap_->matched_writers(topic.topic);
+    }
+    return status;
+  }
+
+  /// Tells the listener; no lock may be held but control_mutex_ and file_mutex_.
+  api::RecorderStatus Changed() {
+    const api::RecorderStatus status = Snapshot();
+    options_.on_change(status.state, status.detail);
+    return status;
+  }
+
+  const Clock& clock_;
+  Log& log_;
+  StatusDecoder decode_status_;
+  RecorderOptions options_;
+  std::unique_ptr<ircp::RawTap> tap_;
+
+  // Taken in this order: control, file, then the inner one.
+  std::mutex control_mutex_;  ///< one command at a time
+  std::mutex file_mutex_;     ///< the file and its bookkeeping
+  std::mutex mutex_;          ///< everything below it
+
+  std::unique_ptr<recording::FileSink> sink_;
+  std::unique_ptr<RecordingFile> file_;
+  Duration last_flush_{0};
+  Duration last_losses_{0};
+  std::uint64_t losses_written_ = 0;
+
+  State state_ = State::kClosed;
+  std::string detail_;
+  std::optional<Error> failure_;  ///< of the last recording
+  std::string path_;
+  std::uint64_t messages_ = 0;
+  std::uint64_t bytes_ = 0;
+  Duration recorded_before_{0};  ///< of this recording, before the last pause
+  Duration recording_since_{0};
+  LossLedger ledger_;
+  std::vector<WriterFigures> at_start_;
+  std::deque<Arrival> queue_;
+  std::size_t queue_bytes_ = 0;
+  bool writing_ = false;
+  std::condition_variable_any arrived_;
+  std::condition_variable drained_;
+
+  std::jthread writer_thread_;
+};
+
+Status MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    return InvalidArgument(folder.string() + ": cannot be made: " + error.message(), "data_dir");
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    return FailedPrecondition(folder.string() + ": cannot be written: " + std::strerror(errno),
+                              "data_dir");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status CheckRecordingName(const std::string& name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
+  };
+  if (name.empty() || name.front() == '.' || name.size() > kLongestName ||
+      !std::all_of(name.begin(), name.end(), allowed)) {
+    return InvalidArgument(
+        "name \"" + name.substr(0, kLongestName) +
+            "\" cannot name a file: letters, digits, '.', '_' and '-', at most " +
+            std::to_string(kLongestName) + ", not beginning with a dot",
+        "name");
+  }
+  return {};
+}
+
+Result<std::unique_ptr<Recorder>> Recorder::Create(ircp::RawBus& bus, const Clock& clock, Log& log,
+                                                   StatusDecoder decode_status,
+                                                   RecorderOptions options) {
+  if (const Status made = MakeFolder(options.data_dir); !made.ok()) return made.error();
+  options.data_dir = std::filesystem::absolute(options.data_dir).lexically_normal();
+  auto recorder =
+      std::make_unique<RecorderImpl>(clock, log, std::move(decode_status), std::move(options));
+  if (const Status opened = recorder->Open(bus); !opened.ok()) return opened.error();
+  return std::unique_ptr<Recorder>(std::move(recorder));
+}
+
+}  // namespace exemplar::recorder

@@ -1,0 +1,55 @@
+#pragma once
+// The recorder's behaviour: topics in, MCAP files out.
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "exemplar/api/services.hpp"
+#include "exemplar/base/clock.hpp"
+#include "exemplar/base/log.hpp"
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/recording/writer.hpp"
+
+namespace exemplar::recorder {
+
+struct RecorderOptions {
+  std::filesystem::path data_dir;  ///< made when absent; one file NAME.mcap a recording
+  std::string station;             ///< noted in the files
+  /// Which topics are received at all.
+  std::function<bool(const ircp::RawTopic&)> wanted = [](const ircp::RawTopic& topic) {
+    return topic.topic.starts_with("ircp/");
+  };
+  /// Samples between network and disk may take this much; what comes beyond is dropped and counted.
+  std::size_t queue_bytes = std::size_t{64} << 20;
+  /// What was received reaches the disk, synced, after this long at the most.
+  Duration flush_interval = std::chrono::milliseconds(100);
+  /// Stop() waits this long at the most for what writers have announced but is still on its way.
+  Duration settle_time = std::chrono::milliseconds(500);
+  recording::WriterOptions file = {};
+  /// Told of each change of state, never with a lock held; must not call the recorder.
+  std::function<void(const std::string& state, const std::string& detail)> on_change =
+      [](const std::string&, const std::string&) {};
+};
+
+/// Decodes a sample of exemplar::ircp::v1::Status, which announces how much its writer has sent.
+using StatusDecoder = std::function<Result<ircp::StatusSample>(std::span<const std::uint8_t> cdr)>;
+
+/// Records all wanted topics of a station, each sample's bytes untouched. Thread-safe.
+///
+/// Callbacks of the network only count and queue; one thread of its own writes. A failing disk
+/// stops the recording with what is written intact and a state that says why.
+class Recorder : public api::RecorderApi {
+ public:
+  /// Fails when data_dir cannot be made or written. The ports must outlive the recorder.
+  static Result<std::unique_ptr<Recorder>> Create(ircp::RawBus& bus, const Clock& clock, Log& log,
+                                                  StatusDecoder decode_status,
+                                                  RecorderOptions options);
+  /// Closes an open file.
+  ~Recorder() override = default;
+};
+
+/// Whether a text can be a file's name: letters, digits, '.', '_', '-', not beginning with a dot.
+Status CheckRecordingName(const std::string& name);
+
+}  // namespace exemplar::recorder

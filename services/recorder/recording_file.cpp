@@ -1,0 +1,122 @@
+#include "recorder/recording_file.hpp"
+
+#include <limits>
+
+namespace exemplar::recorder {
+namespace {
+
+constexpr std::uint16_t kLastId = std::numeric_limits<std::uint16_t>::max();
+
+recording::Metadata AboutWriter(const WriterFigures& figures) {
+  recording::StringMap fields = {{"topic", figures.topic},
+                                 {"writer", figures.writer},
+                                 {"source", figures.source},
+                                 {"received", std::to_string(figures.received)},
+                                 {"lost_in_gaps", std::to_string(figures.lost_in_gaps)},
+                                 {"lost_at_end", std::to_string(figures.lost_at_end)},
+                                 {"dropped_by_recorder", std::to_string(figures.dropped)},
+                                 {"last", std::to_string(figures.last)}};
+  if (figures.announced) fields["announced"] = std::to_string(*figures.announced);
+  return {"exemplar.losses", std::move(fields)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RecordingFile>> RecordingFile::Create(recording::ByteSink& sink,
+                                                             recording::WriterOptions options,
+                                                             const RecordingInfo& info) {
+  Result<std::unique_ptr<recording::Writer>> writer =
+      recording::Writer::Create(sink, std::move(options));
+  if (!writer.ok()) return writer.error();
+  const recording::Metadata about{
+      "exemplar.recording",
+      {{"name", info.name}, {"station", info.station}, {"started", ToIso8601(info.started)}}};
+  if (const Status s = (*writer)->Write(about); !s.ok()) return s.error();
+  if (!info.metadata.empty()) {
+    const recording::Metadata trial{"exemplar.trial", info.metadata};
+    if (const Status s = (*writer)->Write(trial); !s.ok()) return s.error();
+  }
+  std::unique_ptr<RecordingFile> file(new RecordingFile(std::move(*writer), info));
+  file->unsynced_ = true;
+  if (const Status s = file->Flush(); !s.ok()) return s.error();
+  return file;
+}
+
+Result<std::uint16_t> RecordingFile::SchemaOf(const ircp::RawTopic& topic) {
+  if (topic.schema.empty()) return std::uint16_t{0};
+  const auto [known, inserted] = schemas_.try_emplace({topic.type, topic.schema}, std::uint16_t{0});
+  if (!inserted) return known->second;
+  if (schemas_.size() > kLastId) {
+    return Error{ErrorCode::kResourceExhausted, "more than 65535 schemas in one file"};
+  }
+  known->second = static_cast<std::uint16_t>(schemas_.size());
+  recording::Schema schema{known->second, topic.type, "omgidl", {}};
+  schema.data.assign(topic.schema.begin(), topic.schema.end());
+  if (const Status added = writer_->AddSchema(schema); !added.ok()) return added.error();
+  return known->second;
+}
+
+Result<std::uint16_t> RecordingFile::ChannelOf(const ircp::RawTopic& topic,
+                                               const std::string& source,
+                                               const ircp::RawSample& sample) {
+  std::map<std::string, std::uint16_t>& of_topic = channels_[sample.topic];
+  if (const auto known = of_topic.find(sample.writer); known != of_topic.end()) {
+    return known->second;
+  }
+  if (next_channel_ == kLastId) {
+    return Error{ErrorCode::kResourceExhausted, "more than 65535 writers in one file"};
+  }
+  Result<std::uint16_t> schema = SchemaOf(topic);
+  if (!schema.ok()) return schema.error();
+  recording::Channel channel{next_channel_, *schema, sample.topic, "cdr", {}};
+  channel.metadata = {{"writer", sample.writer}, {"type", topic.type}};
+  if (!source.empty()) channel.metadata["source"] = source;
+  if (const Status added = writer_->AddChannel(channel); !added.ok()) return added.error();
+  of_topic[sample.writer] = next_channel_;
+  return next_channel_++;
+}
+
+Status RecordingFile::Write(const ircp::RawTopic& topic, const std::string& source,
+                            const ircp::RawSample& sample) {
+  const Result<std::uint16_t> channel = ChannelOf(topic, source, sample);
+  if (!channel.ok()) return channel.error();
+  recording::MessageView message;
+  message.channel_id = *channel;
+  message.sequence = static_cast<std::uint32_t>(sample.sequence);
+  message.log_time = sample.received;
+  message.publish_time = sample.source_stamp;
+  message.data = sample.cdr;
+  unsynced_ = true;
+  return writer_->Write(message);
+}
+
+Status RecordingFile::Flush() {
+  if (!unsynced_) return {};
+  unsynced_ = false;
+  return writer_->Flush();
+}
+
+Status RecordingFile::WriteLosses(const std::vector<WriterFigures>& losses) {
+  for (const WriterFigures& figures : losses) {
+    unsynced_ = true;
+    if (const Status s = writer_->Write(AboutWriter(figures)); !s.ok()) return s;
+  }
+  return {};
+}
+
+Status RecordingFile::Finish(Stamp stopped, const std::vector<WriterFigures>& losses) {
+  if (const Status s = WriteLosses(losses); !s.ok()) return s;
+  std::uint64_t lost = 0;
+  for (const WriterFigures& figures : losses) lost += figures.lost();
+  const recording::Metadata about{"exemplar.recording",
+                                  {{"name", info_.name},
+                                   {"station", info_.station},
+                                   {"started", ToIso8601(info_.started)},
+                                   {"stopped", ToIso8601(stopped)},
+                                   {"messages", std::to_string(messages())},
+                                   {"lost", std::to_string(lost)}}};
+  if (const Status s = writer_->Write(about); !s.ok()) return s;
+  return writer_->Close();
+}
+
+}  // namespace exemplar::recorder

@@ -1,0 +1,63 @@
+#pragma once
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/recording/writer.hpp"
+#include "recorder/loss_ledger.hpp"
+
+namespace exemplar::recorder {
+
+/// What stands in the file's "exemplar.recording" metadata.
+struct RecordingInfo {
+  std::string name;
+  std::string station;
+  Stamp started;
+  std::map<std::string, std::string> metadata;  ///< the caller's: operator, skill, notes, ...
+};
+
+/// One recording as MCAP: a channel for each writer of a topic (its metadata names writer and
+/// source), schemas as flattened IDL ("omgidl"), messages as "cdr"; log time is reception, publish
+/// time the source's stamp, sequence the low 32 bits of the protocol's number. Metadata records:
+///   exemplar.recording   name, station, times
+///   exemplar.trial       the caller's
+///   exemplar.losses      one a writer and topic: received, lost by cause; again whenever they
+///   grew,
+///                        so the last one of a writer counts
+/// Thread-compatible.
+class RecordingFile {
+ public:
+  /// The sink must outlive the file.
+  static Result<std::unique_ptr<RecordingFile>> Create(recording::ByteSink& sink,
+                                                       recording::WriterOptions options,
+                                                       const RecordingInfo& info);
+
+  /// `topic` as discovery knows it; without schema the message is written without one.
+  Status Write(const ircp::RawTopic& topic, const std::string& source,
+               const ircp::RawSample& sample);
+  Status WriteLosses(const std::vector<WriterFigures>& losses);
+  /// Everything so far survives a kill when it returns.
+  Status Flush();
+  Status Finish(Stamp stopped, const std::vector<WriterFigures>& losses);
+
+  std::uint64_t messages() const { return writer_->statistics().message_count; }
+  std::uint64_t bytes() const { return writer_->bytes_written(); }
+
+ private:
+  RecordingFile(std::unique_ptr<recording::Writer> writer, RecordingInfo info)
+      : writer_(std::move(writer)), info_(std::move(info)) {}
+  Result<std::uint16_t> ChannelOf(const ircp::RawTopic& topic, const std::string& source,
+                                  const ircp::RawSample& sample);
+  Result<std::uint16_t> SchemaOf(const ircp::RawTopic& topic);
+
+  std::unique_ptr<recording::Writer> writer_;
+  RecordingInfo info_;
+  std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;  ///< by type and text
+  std::map<std::string, std::map<std::string, std::uint16_t>> channels_;  ///< by topic and writer
+  std::uint16_t next_channel_ = 1;
+  bool unsynced_ = false;
+};
+
+}  // namespace exemplar::recorder
