@@ -272,35 +272,39 @@ std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
   return {*first, *last};
 }
 
-std::vector<Stretch> MakeStretches(const SkillMotion& motion, const kinematics::Chain& chain,
-                                   const JointTrajectory& trajectory, const PlanOptions& options,
-                                   const std::vector<double>& frame_time_s, double offset_s) {
-  struct Touch {
-    double begin_s, end_s;
-    const std::string* object;
-  };
-  std::vector<Touch> touches;
-  std::vector<double> edges = {0, trajectory.duration_s()};
+std::vector<ContactWindow> MakeWindows(const SkillMotion& motion, const kinematics::Chain& chain,
+                                       const JointTrajectory& trajectory,
+                                       const PlanOptions& options,
+                                       const std::vector<double>& frame_time_s, double offset_s) {
+  std::vector<ContactWindow> windows;
   for (const demonstration::Contact& contact : motion.contacts) {
+    ContactWindow window{contact.object, offset_s + frame_time_s[contact.first],
+                         offset_s + frame_time_s[contact.last], contact.base_p_contact};
     const auto [begin_s, end_s] =
-        TouchTimes(trajectory, chain, offset_s + frame_time_s[contact.first],
-                   offset_s + frame_time_s[contact.last], options.touch_margin_m);
-    touches.push_back({std::max(offset_s, begin_s), end_s, &contact.object});
-    edges.push_back(touches.back().begin_s);
-    edges.push_back(touches.back().end_s);
+        TouchTimes(trajectory, chain, window.begin_s, window.end_s, options.touch_margin_m);
+    window.touch_begin_s = std::max(offset_s, begin_s);
+    window.touch_end_s = end_s;
+    windows.push_back(std::move(window));
+  }
+  return windows;
+}
+
+std::vector<Stretch> MakeStretches(const std::vector<ContactWindow>& windows, double duration_s,
+                                   const std::vector<std::string>& touch_links) {
+  std::vector<double> edges = {0, duration_s};
+  for (const ContactWindow& window : windows) {
+    edges.push_back(window.touch_begin_s);
+    edges.push_back(window.touch_end_s);
   }
   std::sort(edges.begin(), edges.end());
-  const std::vector<std::string> links = options.touch_links.empty()
-                                             ? std::vector<std::string>{chain.tip_link()}
-                                             : options.touch_links;
   std::vector<Stretch> stretches;
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
     if (edges[i + 1] - edges[i] <= 0) continue;
     Stretch stretch{edges[i], edges[i + 1], {}};
     const double middle = 0.5 * (edges[i] + edges[i + 1]);
-    for (const Touch& touch : touches) {
-      if (middle < touch.begin_s || middle > touch.end_s) continue;
-      for (const std::string& link : links) stretch.allowed.push_back({link, *touch.object});
+    for (const ContactWindow& window : windows) {
+      if (middle < window.touch_begin_s || middle > window.touch_end_s) continue;
+      for (const std::string& link : touch_links) stretch.allowed.push_back({link, window.object});
     }
     stretches.push_back(std::move(stretch));
   }
@@ -369,8 +373,11 @@ class Planner {
     plan.report.approach_s = offset;
     plan.report.time_stretch = skill.duration_s() / prepared_.path.time_s.back();
 
+    plan.contacts = MakeWindows(motion_, chain_, plan.trajectory, options_, frame_time_s, offset);
     const std::vector<Stretch> stretches =
-        MakeStretches(motion_, chain_, plan.trajectory, options_, frame_time_s, offset);
+        MakeStretches(plan.contacts, plan.trajectory.duration_s(),
+                      options_.touch_links.empty() ? std::vector<std::string>{chain_.tip_link()}
+                                                   : options_.touch_links);
     const TrajectoryPath swept(plan.trajectory, model_, chain_);
     for (const Stretch& stretch : stretches) {
       const std::optional<collision::Violation> violation = checker_.FirstViolation(
@@ -382,10 +389,6 @@ class Planner {
       }
     }
     MeasureClearance(plan.trajectory, model_, chain_, checker_, stretches, plan.report);
-    for (const demonstration::Contact& contact : motion_.contacts) {
-      plan.contacts.push_back({contact.object, offset + frame_time_s[contact.first],
-                               offset + frame_time_s[contact.last], contact.base_p_contact});
-    }
     if (plan.report.max_joint_step_rad > kLargeJointStep_rad) {
       plan.report.warnings.push_back("a joint moves " +
                                      FormatFixed(plan.report.max_joint_step_rad, 2) +

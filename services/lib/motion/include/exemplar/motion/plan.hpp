@@ -71,6 +71,9 @@ struct ContactWindow {
   double begin_s = 0;
   double end_s = 0;
   Eigen::Vector3d base_p_contact = Eigen::Vector3d::Zero();
+  /// The contact with its margins: here the touch links may touch the object.
+  double touch_begin_s = 0;
+  double touch_end_s = 0;
 };
 
 struct PlannedMotion {

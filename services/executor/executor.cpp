@@ -1,0 +1,565 @@
+#include "executor/executor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "exemplar/base/text.hpp"
+
+namespace exemplar::executor {
+
+namespace {
+
+constexpr const char* kProgram = "executor";
+constexpr double kBeat_s = 0.1;
+constexpr Duration kShutdownPatience = std::chrono::seconds(5);
+
+Error Refused(State state, Event event, const std::string& holder) {
+  std::string message =
+      "cannot " + std::string(ToString(event)) + " while " + std::string(ToString(state));
+  if (!holder.empty() && (IsMoving(state) || state == State::kPlanning)) {
+    message += ": the robot belongs to " + holder;
+  }
+  if (state == State::kProtectiveStop || state == State::kEmergencyStop) {
+    message += "; reset first";
+  }
+  return FailedPrecondition(std::move(message));
+}
+
+}  // namespace
+
+Executor::Executor(const Clock& clock, Log& log, api::SkillApi& skills,
+                   const kinematics::RobotDescription& robot, const scene::Description& scene,
+                   ExecutorOptions options)
+    : clock_(clock),
+      log_(log),
+      skills_(skills),
+      robot_(robot),
+      scene_(scene),
+      options_(std::move(options)),
+      view_(robot.chain.joint_names()),
+      state_received_ns_(std::numeric_limits<std::int64_t>::min()) {}
+
+Result<std::unique_ptr<Executor>> Executor::Create(ircp::Bus& bus, const Clock& clock, Log& log,
+                                                   api::SkillApi& skills,
+                                                   const kinematics::RobotDescription& robot,
+                                                   const scene::Description& scene,
+                                                   ExecutorOptions options) {
+  if (!(options.rate_hz >= 1 && options.rate_hz <= 1000)) {
+    return InvalidArgument(
+        "rate is " + FormatDouble(options.rate_hz) + " Hz, must be between 1 and 1000", "rate_hz");
+  }
+  if (static_cast<std::size_t>(robot.chain.dof()) > kMaxJoints) {
+    return InvalidArgument("robot \"" + robot.name + "\" has " + std::to_string(robot.chain.dof()) +
+                           " joints, at most " + std::to_string(kMaxJoints) + " can be commanded");
+  }
+  options.plan.touch_links = robot.touch_links;
+  options.plan.comfortable = robot.home;
+  // Meshes and shapes are looked at once now, so that a bad one shows before anything moves.
+  const Result<collision::CollisionChecker> checker =
+      collision::CollisionChecker::Create(robot.model, collision::MakeScene(scene));
+  if (!checker.ok()) return checker.error();
+  std::unique_ptr<Executor> executor(
+      new Executor(clock, log, skills, robot, scene, std::move(options)));
+  const Status connected = executor->Connect(bus);
+  if (!connected.ok()) return connected.error();
+  return executor;
+}
+
+Status Executor::Connect(ircp::Bus& bus) {
+  auto writer = bus.MakeWriter<ircp::JointCommandSample>(kProgram);
+  if (!writer.ok()) return writer.error();
+  const Duration period = FromSeconds(1 / options_.rate_hz);
+  const Duration validity = std::max<Duration>(5 * period, std::chrono::milliseconds(100));
+  commands_ =
+      std::make_unique<CommandStream>(*std::move(writer), robot_.chain.joint_names(), validity);
+  auto control = ircp::ControlServer::Create(
+      bus, clock_, kProgram,
+      [this](const ircp::CommandSample& command) { return OnCommand(command); });
+  if (!control.ok()) return control.error();
+  control_ = *std::move(control);
+  control_->SetSentCounts([this] {
+    return std::vector<ircp::TopicCount>{
+        {ircp::JointCommandSample::kTopic, kProgram, commands_->sent()}};
+  });
+  control_->SetState(std::string(ToString(State::kIdle)), "");
+
+  control_thread_ = std::jthread([this](const std::stop_token& stop) { ControlLoop(stop); });
+  watch_thread_ = std::jthread([this](const std::stop_token& stop) { WatchLoop(stop); });
+  publish_thread_ = std::jthread([this](const std::stop_token& stop) { PublishLoop(stop); });
+
+  auto states = bus.MakeReader<ircp::JointStateSample>(
+      [this](const ircp::JointStateSample& sample, const ircp::Reception&) {
+        OnJointState(sample);
+      });
+  if (!states.ok()) return states.error();
+  state_reader_ = *std::move(states);
+  auto objects = bus.MakeReader<ircp::ObjectSample>(
+      [this](const ircp::ObjectSample& sample, const ircp::Reception&) {
+        view_.Take(sample, clock_.Steady());
+      });
+  if (!objects.ok()) return objects.error();
+  object_reader_ = *std::move(objects);
+  auto safety = bus.MakeReader<ircp::SafetySample>(
+      [this](const ircp::SafetySample& sample, const ircp::Reception&) { OnSafety(sample); });
+  if (!safety.ok()) return safety.error();
+  safety_reader_ = *std::move(safety);
+  return {};
+}
+
+Executor::~Executor() {
+  state_reader_.reset();
+  object_reader_.reset();
+  safety_reader_.reset();
+  for (std::jthread* thread : {&control_thread_, &watch_thread_, &publish_thread_}) {
+    thread->request_stop();
+    if (thread->joinable()) thread->join();
+  }
+  control_.reset();
+}
+
+// ---------------------------------------------------------------- state
+
+Status Executor::Apply(Event event, std::string detail, std::shared_ptr<MotionRun> run) {
+  State before;
+  State after;
+  {
+    const std::lock_guard lock(mutex_);
+    before = state_.load();
+    const std::optional<State> next = Next(before, event);
+    if (!next) return Refused(before, event, holder_);
+    after = *next;
+    if (after == before && event == Event::kEmergency) return {};
+    state_.store(after);
+    detail_ = detail;
+    if (before == State::kPlanning && after != State::kReady) planning_stop_.request_stop();
+    if (run) {
+      run_ = std::move(run);
+      run_over_ = false;
+      beats_ = 0;
+    }
+    if (IsMoving(before) && !IsMoving(after)) {
+      run_end_ = after;
+      run_detail_ = detail;
+    }
+    transitions_.emplace_back(after, detail);
+  }
+  changed_.notify_all();
+  const bool bad = after == State::kProtectiveStop || after == State::kEmergencyStop;
+  log_.Write(bad ? LogLevel::kWarning : LogLevel::kInfo, ToString(after),
+             {{"was", ToString(before)}, {"event", ToString(event)}, {"detail", detail}});
+  return {};
+}
+
+Status Executor::Pause() { return Apply(Event::kPause, "paused"); }
+Status Executor::Resume() { return Apply(Event::kResume, "resumed"); }
+Status Executor::Cancel() { return Apply(Event::kCancel, "cancelled"); }
+Status Executor::Stop() { return Apply(Event::kStop, "stopped by request"); }
+Status Executor::Reset() { return Apply(Event::kReset, ""); }
+
+Status Executor::SetSpeed(double factor) {
+  if (!(factor > 0 && factor <= 1)) {
+    return InvalidArgument("speed is " + FormatDouble(factor) + ", must be above 0 and at most 1",
+                           "factor");
+  }
+  speed_.store(factor);
+  log_.Info("speed", {{"factor", factor}});
+  return {};
+}
+
+ircp::Answer Executor::OnCommand(const ircp::CommandSample& command) {
+  Status done;
+  if (command.action == "pause") {
+    done = Pause();
+  } else if (command.action == "resume") {
+    done = Resume();
+  } else if (command.action == "cancel") {
+    done = Cancel();
+  } else if (command.action == "stop") {
+    done = Stop();
+  } else if (command.action == "reset") {
+    done = Reset();
+  } else if (command.action == "speed") {
+    const auto factor = command.arguments.find("factor");
+    const std::optional<double> value =
+        factor == command.arguments.end() ? std::nullopt : ParseDouble(factor->second);
+    done =
+        value ? SetSpeed(*value) : InvalidArgument("speed needs a number as \"factor\"", "factor");
+  } else {
+    done = InvalidArgument("unknown action \"" + command.action +
+                           "\"; known are pause, resume, cancel, stop, reset, speed");
+  }
+  if (!done.ok()) return {false, done.error().message, {}};
+  return {true, std::string(ToString(state_.load())), {}};
+}
+
+void Executor::OnSafety(const ircp::SafetySample& sample) {
+  if (sample.emergency_stop) {
+    (void)Apply(Event::kEmergency, "emergency stop by " + sample.header.source);
+  } else if (sample.reset && state_.load() == State::kEmergencyStop) {
+    (void)Apply(Event::kReset, "reset by " + sample.header.source);
+  }
+}
+
+void Executor::OnJointState(const ircp::JointStateSample& sample) {
+  const Duration now = clock_.Steady();
+  const std::optional<MeasuredState> state = view_.Take(sample, now);
+  if (!state) return;
+  state_received_ns_.store(now.count());
+  std::shared_ptr<MotionRun> run;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!run_over_) run = run_;
+    if (run) run->Measure(*state);
+  }
+  if (run) changed_.notify_all();
+}
+
+std::optional<Duration> Executor::StateAge() const {
+  const std::int64_t received = state_received_ns_.load();
+  if (received == std::numeric_limits<std::int64_t>::min()) return std::nullopt;
+  return clock_.Steady() - Duration(received);
+}
+
+Result<api::RobotStatus> Executor::GetStatus() {
+  api::RobotStatus status;
+  {
+    const std::lock_guard lock(mutex_);
+    status.state = ToString(state_.load());
+    status.detail = detail_;
+  }
+  status.speed = speed_.load();
+  const Duration now = clock_.Steady();
+  if (const std::optional<MeasuredState> measured = view_.latest()) {
+    status.joint_names = robot_.chain.joint_names();
+    status.joints = measured->joints;
+    status.state_age_s = ToSeconds(now - measured->received);
+    status.base_T_tool = robot_.chain.ToolPose(measured->joints);
+  } else if (status.detail.empty()) {
+    status.detail = view_.problem();
+  }
+  status.objects = view_.objects(now);
+  return status;
+}
+
+// ---------------------------------------------------------------- planning
+
+Status Executor::Begin(const api::ExecuteRequest& request) {
+  if (request.skill.empty()) return InvalidArgument("no skill is named", "skill");
+  if (!(request.speed > 0 && request.speed <= 1)) {
+    return InvalidArgument(
+        "speed is " + FormatDouble(request.speed) + ", must be above 0 and at most 1", "speed");
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (closing_) return Unavailable("the executor is shutting down");
+    if (!run_over_) return Refused(state_.load(), Event::kPlan, holder_);
+  }
+  Status begun = Apply(Event::kPlan, "planning \"" + request.skill + "\"");
+  if (!begun.ok()) return begun;
+  const std::lock_guard lock(mutex_);
+  holder_ = "an execution of \"" + request.skill + "\"";
+  return {};
+}
+
+Result<Eigen::VectorXd> Executor::StartJoints() const {
+  const std::optional<Duration> age = StateAge();
+  const std::optional<MeasuredState> measured = view_.latest();
+  if (!age || !measured) {
+    const std::string problem = view_.problem();
+    return Unavailable("nothing usable was heard from the robot on ircp/joint_state" +
+                       (problem.empty() ? "" : ": " + problem));
+  }
+  if (*age > options_.state_patience) {
+    return Unavailable("the robot's last joint state is " + FormatFixed(ToSeconds(*age), 2) +
+                       " s old, " + FormatFixed(ToSeconds(options_.state_patience), 2) +
+                       " s allowed");
+  }
+  const std::lock_guard lock(mutex_);
+  if (last_command_ &&
+      (*last_command_ - measured->joints).cwiseAbs().maxCoeff() <= options_.start_tolerance_rad) {
+    return *last_command_;
+  }
+  return measured->joints;
+}
+
+Result<std::vector<geometry::NamedPose>> Executor::ObjectsFor(const api::ExecuteRequest& request) {
+  if (!request.objects.empty()) return request.objects;
+  const Result<learning::SkillReport> skill = skills_.Show(request.skill, request.version);
+  if (!skill.ok()) return skill.error();
+  std::vector<geometry::NamedPose> objects;
+  std::string seen_names;
+  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) {
+    seen_names += (seen_names.empty() ? "" : ", ") + seen.pose.name + " (" +
+                  FormatFixed(seen.age_s, 1) + " s ago)";
+    if (seen.age_s > ToSeconds(options_.object_patience)) continue;
+    if (!skill->target.empty() && seen.pose.name != skill->target) continue;
+    objects.push_back(seen.pose);
+  }
+  if (objects.empty()) {
+    return FailedPrecondition("object \"" + skill->target +
+                                  "\" was not seen on ircp/objects in the last " +
+                                  FormatFixed(ToSeconds(options_.object_patience), 1) +
+                                  " s; seen: " + (seen_names.empty() ? "nothing" : seen_names),
+                              "objects");
+  }
+  return objects;
+}
+
+Result<Executor::Planned> Executor::TryPlan(const api::ExecuteRequest& request,
+                                            std::stop_token stop) {
+  Result<Eigen::VectorXd> start = StartJoints();
+  if (!start.ok()) return start.error();
+  Result<std::vector<geometry::NamedPose>> objects = ObjectsFor(request);
+  if (!objects.ok()) return objects.error();
+
+  demonstration::SkillQuery query;
+  query.objects = *objects;
+  if (request.start) {
+    query.start = request.start;
+  } else {
+    query.start = robot_.chain.ToolPose(*start);
+    query.joint_start_names = robot_.chain.joint_names();
+    query.joint_start = *start;
+  }
+  Result<demonstration::SkillMotion> motion = skills_.Query(request.skill, request.version, query);
+  if (!motion.ok()) return motion.error();
+
+  // What is seen stands where it is seen, but what was asked for stands where it was asked for.
+  std::vector<geometry::NamedPose> placed;
+  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) placed.push_back(seen.pose);
+  const std::vector<geometry::NamedPose>& used =
+      motion->objects.empty() ? *objects : motion->objects;
+  placed.insert(placed.end(), used.begin(), used.end());
+  Result<collision::CollisionChecker> checker =
+      collision::CollisionChecker::Create(robot_.model, collision::MakeScene(scene_, placed));
+  if (!checker.ok()) return checker.error();
+  motion::PlanOptions options = options_.plan;
+  options.speed_scale = request.speed;
+  Result<motion::PlannedMotion> planned = motion::PlanMotion(
+      *motion, robot_.model, robot_.chain, *checker, *start, options, std::move(stop));
+  if (!planned.ok()) return planned.error();
+
+  Planned out{*std::move(planned), *std::move(checker), used, motion->warnings, motion->frames()};
+  out.warnings.insert(out.warnings.end(), out.motion.report.warnings.begin(),
+                      out.motion.report.warnings.end());
+  return out;
+}
+
+Result<Executor::Planned> Executor::MakePlan(const api::ExecuteRequest& request) {
+  std::stop_token stop;
+  {
+    const std::lock_guard lock(mutex_);
+    planning_stop_ = std::stop_source();
+    stop = planning_stop_.get_token();
+  }
+  Result<Planned> planned = TryPlan(request, stop);
+  if (!planned.ok()) {
+    (void)Apply(Event::kRefused, "refused: " + planned.error().message);
+    return planned;
+  }
+  const Status ready = Apply(Event::kPlanned, "planned \"" + request.skill + "\"");
+  if (!ready.ok()) {
+    return Error{ErrorCode::kCancelled,
+                 "planning was ended: the robot is in " + std::string(ToString(state_.load()))};
+  }
+  return planned;
+}
+
+api::PlanSummary Executor::Summarise(const Planned& planned) const {
+  const motion::PlanReport& report = planned.motion.report;
+  api::PlanSummary summary;
+  summary.duration_s = planned.motion.trajectory.duration_s();
+  summary.frames = planned.frames;
+  summary.max_position_error_m = report.max_position_error_m;
+  summary.max_contact_error_m = report.max_contact_error_m;
+  summary.clearance_m = report.smallest_clearance.distance_m;
+  if (!report.smallest_clearance.first.empty()) {
+    summary.clearance_between =
+        report.smallest_clearance.first + " and " + report.smallest_clearance.second;
+  }
+  summary.time_stretch = report.time_stretch;
+  summary.warnings = planned.warnings;
+  return summary;
+}
+
+Result<api::PlanSummary> Executor::Plan(const api::ExecuteRequest& request) {
+  const Status begun = Begin(request);
+  if (!begun.ok()) return begun.error();
+  const Result<Planned> planned = MakePlan(request);
+  if (!planned.ok()) return planned.error();
+  return Summarise(*planned);
+}
+
+// ---------------------------------------------------------------- execution
+
+Status Executor::CheckStillThere(const motion::PlannedMotion& plan) const {
+  const std::optional<MeasuredState> measured = view_.latest();
+  const Eigen::VectorXd first = plan.trajectory.positions.row(0).transpose();
+  int joint = 0;
+  const double off = (measured->joints - first).cwiseAbs().maxCoeff(&joint);
+  if (off <= options_.start_tolerance_rad) return {};
+  return FailedPrecondition("the robot has moved since it was planned: joint \"" +
+                            robot_.chain.joint_names()[joint] + "\" is " + FormatFixed(off, 3) +
+                            " rad away from the motion's start");
+}
+
+Result<api::ExecutionResult> Executor::Execute(
+    const api::ExecuteRequest& request,
+    const std::function<void(const api::ExecutionFeedback&)>& feedback, std::stop_token stop) {
+  const Status begun = Begin(request);
+  if (!begun.ok()) return begun.error();
+  const std::stop_callback on_stop(stop, [this] { (void)Cancel(); });
+  if (feedback) feedback({std::string(ToString(State::kPlanning)), 0, 0, 0, 0});
+  Result<Planned> planned = MakePlan(request);
+  if (!planned.ok()) return planned.error();
+
+  api::ExecutionResult result;
+  result.plan = Summarise(*planned);
+  result.objects = planned->objects;
+  const Status there = CheckStillThere(planned->motion);
+  if (!there.ok()) {
+    (void)Apply(Event::kReset, there.error().message);
+    return there.error();
+  }
+  const std::uint64_t sent_before = commands_->sent();
+  const auto run = std::make_shared<MotionRun>(robot_, std::move(planned->motion),
+                                               std::move(planned->checker), options_.watch);
+  const Status started = Apply(Event::kStart, "executing \"" + request.skill + "\"", run);
+  if (!started.ok()) return started.error();
+
+  std::unique_lock lock(mutex_);
+  for (std::uint64_t told = 0;;) {
+    changed_.wait(lock, [&] { return run_over_ || beats_ != told; });
+    if (run_over_) break;
+    told = beats_;
+    if (!feedback) continue;
+    const api::ExecutionFeedback now{std::string(ToString(state_.load())), run->path_time_s(),
+                                     run->duration_s(), run->tracking_error_rad(), run->touch_n()};
+    lock.unlock();
+    feedback(now);
+    lock.lock();
+  }
+  changed_.wait(lock, [&] { return !run->has_unwatched(); });
+  result.state = ToString(run_end_);
+  result.detail = run_detail_;
+  lock.unlock();
+
+  commands_->Flush();
+  run->Report(result);
+  result.commands_sent = commands_->sent() - sent_before;
+  log_.Info("executed", {{"skill", request.skill},
+                         {"state", result.state},
+                         {"tracking_error_rad", result.tracking_error_rad},
+                         {"clearance_m", result.clearance_m},
+                         {"commands", result.commands_sent},
+                         {"lateness_p99_s", result.lateness_p99_s}});
+  return result;
+}
+
+void Executor::ControlLoop(const std::stop_token& stop) {
+  while (true) {
+    std::shared_ptr<MotionRun> run;
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop,
+                         [this] { return !run_over_ && state_.load() != State::kReady; })) {
+        return;
+      }
+      run = run_;
+    }
+    RunMotion(*run, stop);
+    if (state_.load() == State::kExecuting) (void)Apply(Event::kFinish, "done");
+    {
+      const std::lock_guard lock(mutex_);
+      run_over_ = true;
+      run_end_ = state_.load();
+      run_detail_ = detail_;
+      last_command_ = run->commanded();
+    }
+    changed_.notify_all();
+  }
+}
+
+bool Executor::RunMotion(MotionRun& run, const std::stop_token& stop) {
+  const Duration period = FromSeconds(1 / options_.rate_hz);
+  Duration deadline = clock_.Steady();
+  Duration before = deadline;
+  double since_beat_s = 0;
+  while (!run.finished()) {
+    if (!clock_.SleepUntil(deadline, stop)) return false;
+    const Duration now = clock_.Steady();
+    run.AddLateness(now - deadline);
+    // Cycles that were missed altogether are skipped; the path goes on by the time that passed.
+    while (deadline + period <= now) deadline += period;
+    const double elapsed_s = ToSeconds(deadline - before);
+    before = deadline;
+    deadline += period;
+    commands_->Put(run.Tick(elapsed_s, state_.load(), speed_.load(std::memory_order_relaxed)));
+
+    const std::optional<Duration> age = StateAge();
+    if (IsMoving(state_.load()) && (!age || *age > options_.state_patience)) {
+      (void)Apply(Event::kFault, "the robot's last joint state is " +
+                                     FormatFixed(age ? ToSeconds(*age) : 0, 2) + " s old");
+    }
+    since_beat_s += elapsed_s;
+    if (since_beat_s >= kBeat_s) {
+      since_beat_s = 0;
+      {
+        const std::lock_guard lock(mutex_);
+        ++beats_;
+      }
+      changed_.notify_all();
+    }
+  }
+  return true;
+}
+
+void Executor::WatchLoop(const std::stop_token& stop) {
+  while (true) {
+    std::shared_ptr<MotionRun> run;
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [this] { return run_ != nullptr && run_->has_unwatched(); })) {
+        return;
+      }
+      run = run_;
+    }
+    const std::optional<std::string> wrong = run->Watch();
+    if (wrong && IsMoving(state_.load())) (void)Apply(Event::kFault, *wrong);
+    WakeAll();
+  }
+}
+
+void Executor::PublishLoop(const std::stop_token& stop) {
+  while (true) {
+    std::pair<State, std::string> transition;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, stop, [this] { return !transitions_.empty(); });
+      if (transitions_.empty()) return;
+      transition = std::move(transitions_.front());
+      transitions_.pop_front();
+    }
+    control_->SetState(std::string(ToString(transition.first)), transition.second);
+  }
+}
+
+void Executor::WakeAll() {
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_all();
+}
+
+void Executor::Shutdown() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  if (IsMoving(state_.load()) || state_.load() == State::kPlanning) {
+    (void)Apply(Event::kStop, "the executor is shutting down");
+  }
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, kShutdownPatience, [this] { return run_over_; });
+}
+
+}  // namespace exemplar::executor

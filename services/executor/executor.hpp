@@ -1,0 +1,141 @@
+#pragma once
+// Executes skills on a robot: asks the learning service for the motion, plans it, streams it as
+// joint commands and watches what the robot does. Not safety-rated.
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "executor/command_stream.hpp"
+#include "executor/motion_run.hpp"
+#include "executor/robot_view.hpp"
+#include "executor/state_machine.hpp"
+#include "exemplar/api/services.hpp"
+#include "exemplar/base/clock.hpp"
+#include "exemplar/base/log.hpp"
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/control.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/motion/plan.hpp"
+#include "exemplar/scene/description.hpp"
+
+namespace exemplar::executor {
+
+struct ExecutorOptions {
+  double rate_hz = 125;
+  /// Older joint states count as none: planning is refused, a motion is stopped.
+  Duration state_patience = std::chrono::milliseconds(250);
+  /// Objects seen longer ago are not used unless they are asked for with their pose.
+  Duration object_patience = std::chrono::seconds(2);
+  /// The motion begins at the last commanded posture where the robot is this near to it, else at
+  /// the measured one; and is refused where it has moved further than this while it was planned.
+  double start_tolerance_rad = 0.05;
+  WatchLimits watch = {};
+  motion::PlanOptions plan = {};  ///< touch links and comfortable posture come from the robot
+};
+
+/// Thread-safe. The command over ircp/executor/command does the same as the methods: pause, resume,
+/// cancel, stop, reset, speed{factor}; each transition goes out on ircp/executor/status.
+class Executor final : public api::ExecutorApi {
+ public:
+  /// The arguments by reference outlive the executor.
+  static Result<std::unique_ptr<Executor>> Create(ircp::Bus& bus, const Clock& clock, Log& log,
+                                                  api::SkillApi& skills,
+                                                  const kinematics::RobotDescription& robot,
+                                                  const scene::Description& scene,
+                                                  ExecutorOptions options = {});
+  /// Precondition: no call runs any more. A motion that still runs ends without a ramp: see
+  /// Shutdown.
+  ~Executor() override;
+
+  Result<api::PlanSummary> Plan(const api::ExecuteRequest& request) override;
+  Result<api::ExecutionResult> Execute(
+      const api::ExecuteRequest& request,
+      const std::function<void(const api::ExecutionFeedback&)>& feedback,
+      std::stop_token stop) override;
+  Result<api::RobotStatus> GetStatus() override;
+  Status Pause() override;
+  Status Resume() override;
+  Status Cancel() override;
+  Status Stop() override;
+  Status Reset() override;
+  Status SetSpeed(double factor) override;
+
+  /// Brings a motion to rest on its path and returns when it rests; nothing is executed afterwards.
+  void Shutdown();
+
+ private:
+  struct Planned {
+    motion::PlannedMotion motion;
+    collision::CollisionChecker checker;
+    std::vector<geometry::NamedPose> objects;
+    std::vector<std::string> warnings;
+    int frames = 0;
+  };
+
+  Executor(const Clock& clock, Log& log, api::SkillApi& skills,
+           const kinematics::RobotDescription& robot, const scene::Description& scene,
+           ExecutorOptions options);
+  Status Connect(ircp::Bus& bus);
+
+  /// Takes the event, or refuses it. `run`: what begins with kStart.
+  Status Apply(Event event, std::string detail, std::shared_ptr<MotionRun> run = nullptr);
+  Status Begin(const api::ExecuteRequest& request);
+  /// Asks for the motion and plans it; leaves kReady, or goes back to kIdle where there is none.
+  Result<Planned> MakePlan(const api::ExecuteRequest& request);
+  Result<Planned> TryPlan(const api::ExecuteRequest& request, std::stop_token stop);
+  Result<Eigen::VectorXd> StartJoints() const;
+  Result<std::vector<geometry::NamedPose>> ObjectsFor(const api::ExecuteRequest& request);
+  Status CheckStillThere(const motion::PlannedMotion& plan) const;
+  api::PlanSummary Summarise(const Planned& planned) const;
+
+  void OnJointState(const ircp::JointStateSample& sample);
+  void OnSafety(const ircp::SafetySample& sample);
+  ircp::Answer OnCommand(const ircp::CommandSample& command);
+  std::optional<Duration> StateAge() const;
+
+  void ControlLoop(const std::stop_token& stop);
+  /// False when `stop` came first.
+  bool RunMotion(MotionRun& run, const std::stop_token& stop);
+  void WatchLoop(const std::stop_token& stop);
+  void PublishLoop(const std::stop_token& stop);
+  void WakeAll();
+
+  const Clock& clock_;
+  Log& log_;
+  api::SkillApi& skills_;
+  const kinematics::RobotDescription& robot_;
+  const scene::Description& scene_;
+  const ExecutorOptions options_;
+  RobotView view_;
+  std::atomic<std::int64_t> state_received_ns_;
+  std::atomic<double> speed_{1.0};
+  std::atomic<State> state_{State::kIdle};  ///< written under mutex_
+
+  mutable std::mutex mutex_;  ///< guards what follows
+  std::condition_variable_any changed_;
+  std::string detail_;
+  std::string holder_;  ///< the request that planning or motion belongs to
+  std::stop_source planning_stop_;
+  std::shared_ptr<MotionRun> run_;  ///< shared with the threads that run and watch it
+  bool run_over_ = true;            ///< the control loop is through with run_
+  State run_end_ = State::kIdle;    ///< the state that ended its motion, and why
+  std::string run_detail_;
+  std::uint64_t beats_ = 0;  ///< a tenth of a second of motion each
+  std::optional<Eigen::VectorXd> last_command_;
+  std::deque<std::pair<State, std::string>> transitions_;
+  bool closing_ = false;
+
+  std::unique_ptr<CommandStream> commands_;
+  std::unique_ptr<ircp::ControlServer> control_;
+  std::unique_ptr<ircp::Reader> state_reader_, object_reader_, safety_reader_;
+  std::jthread control_thread_, watch_thread_, publish_thread_;
+};
+
+}  // namespace exemplar::executor

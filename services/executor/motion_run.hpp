@@ -1,0 +1,79 @@
+#pragma once
+// One execution: the path being run through, and what is measured on the way.
+
+#include <Eigen/Core>
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "executor/command_stream.hpp"
+#include "executor/lateness.hpp"
+#include "executor/monitor.hpp"
+#include "executor/path_player.hpp"
+#include "executor/robot_view.hpp"
+#include "executor/state_machine.hpp"
+
+namespace exemplar::executor {
+
+/// From full speed to rest along the path, and back. Faults, stops and emergencies: the shorter.
+inline constexpr double kPauseRamp_s = 0.3;
+inline constexpr double kStopRamp_s = 0.12;
+/// The last posture goes on being commanded for so long, so that the robot arrives in it.
+inline constexpr double kSettle_s = 0.3;
+
+/// Three threads meet here: Tick and AddLateness belong to the control loop, Measure to the
+/// network, Watch and Report to whoever watches. Each is safe beside the others.
+class MotionRun {
+ public:
+  MotionRun(const kinematics::RobotDescription& robot, motion::PlannedMotion plan,
+            collision::CollisionChecker checker, const WatchLimits& limits);
+  MotionRun(const MotionRun&) = delete;
+  MotionRun& operator=(const MotionRun&) = delete;
+
+  /// One cycle of the control loop, `elapsed_s` after the one before. Does not allocate.
+  const Setpoint& Tick(double elapsed_s, State state, double speed);
+  void AddLateness(Duration lateness) { lateness_.Add(lateness); }
+  /// The end is reached, or rest after a stop, and the robot had time to arrive. Set by Tick.
+  bool finished() const { return finished_.load(std::memory_order_acquire); }
+  double path_time_s() const { return path_time_s_.load(std::memory_order_relaxed); }
+  double duration_s() const { return plan_.trajectory.duration_s(); }
+  Eigen::VectorXd commanded() const;
+
+  void Measure(const MeasuredState& state);
+
+  /// Takes what was measured since into the figures; says what is wrong, if anything.
+  std::optional<std::string> Watch();
+  bool has_unwatched() const;
+  double tracking_error_rad() const { return tracking_rad_.load(std::memory_order_relaxed); }
+  double touch_n() const { return touch_n_.load(std::memory_order_relaxed); }
+  /// Precondition: finished() and nothing unwatched.
+  void Report(api::ExecutionResult& result) const;
+
+ private:
+  static constexpr std::size_t kMaxUnwatched = 1024;
+
+  const motion::PlannedMotion plan_;
+  PathPlayer player_;
+  Setpoint setpoint_;
+  Eigen::VectorXd position_, velocity_;
+  double settled_s_ = 0;
+  double elapsed_s_ = 0;
+  LatenessHistogram lateness_;
+
+  std::atomic<bool> finished_{false};
+  std::atomic<double> path_time_s_{0};
+  std::atomic<double> tracking_rad_{0};
+  std::atomic<double> touch_n_{0};
+
+  mutable std::mutex mutex_;  ///< guards what follows
+  Eigen::VectorXd commanded_;
+  double commanded_elapsed_s_ = 0;
+  std::vector<Measurement> measured_;
+  bool watching_ = false;
+
+  Monitor monitor_;  ///< Watch and Report only
+};
+
+}  // namespace exemplar::executor
