@@ -221,7 +221,7 @@ class Solver {
   /// Moves best_, which meets the pose, along the null space to the least weighted distance to
   /// `preferred`: Newton's steps for the tangent problem, each brought back onto the pose.
   void ApproachPreferred(int& iterations) {
-    const Eigen::VectorXd goal = options_.preferred.cwiseMax(lower_).cwiseMin(upper_);
+    const Eigen::VectorXd& goal = options_.preferred;
     double longest = kNullSpaceStep;
     double distance = Cost(best_.q - goal);
     for (int i = 0; i < kNullSpaceIterations && longest > 1e-5; ++i) {
@@ -238,6 +238,7 @@ class Solver {
           distance = reached;
           std::swap(best_, now_);
           if (settled) return;
+          longest = std::min(kNullSpaceStep, 2 * longest);
           continue;
         }
       }

@@ -68,6 +68,7 @@ class UrdfReader {
                              ": not well-formed XML (" + document.ErrorName() + ")");
     }
     const XMLElement* robot = document.RootElement();
+    if (robot == nullptr) return InvalidArgument(source_ + ":1: there is no <robot> element");
     if (std::string_view(robot->Name()) != "robot") {
       return At(*robot, "the root element is <" + std::string(robot->Name()) +
                             ">, a URDF starts with <robot>");
