@@ -8,12 +8,27 @@
 namespace exemplar::cli {
 namespace {
 
-std::string Footer(const std::vector<std::string>& examples) {
+std::string Footer(const std::vector<std::string>& examples, const std::string& notes) {
   if (examples.empty()) return {};
   std::string text = "Examples:";
   for (const std::string& example : examples) text += "\n  " + example;
-  return text;
+  return text + "\n\n" + notes + '\n';
 }
+
+/// Lists commands by the first line of what they say of themselves.
+class Formatter final : public CLI::Formatter {
+ public:
+  std::string make_subcommand(const CLI::App* command) const override {
+    const std::string description = command->get_description();
+    std::stringstream out;
+    CLI::detail::format_help(out, command->get_name(),
+                             description.substr(0, description.find('\n')), column_width_);
+    return out.str();
+  }
+  std::string make_description(const CLI::App* command) const override {
+    return CLI::Formatter::make_description(command) + '\n';
+  }
+};
 
 /// The command that the words reached before something went wrong.
 const CLI::App* Deepest(const CLI::App* app) {
@@ -84,7 +99,7 @@ Command Command::Add(const std::string& name, const std::string& summary,
                      const std::vector<std::string>& examples) {
   CLI::App* added = app_->add_subcommand(name, summary);
   added->fallthrough();
-  added->footer(Footer(examples));
+  added->footer(Footer(examples, "--server and --timeout as in \"exemplar --help\"."));
   app_->require_subcommand(1);
   return {added, chosen_};
 }
@@ -145,7 +160,13 @@ Command& Command::Required() {
 }
 
 Command& Command::OneOf(const std::vector<std::string>& choices) {
-  last_->check(CLI::IsMember(choices))->type_name(Join(choices, "|"));
+  const CLI::Validator one_of(
+      [choices](const std::string& word) {
+        if (std::find(choices.begin(), choices.end(), word) != choices.end()) return std::string();
+        return "\"" + word + "\" is not one of " + Join(choices, ", ");
+      },
+      "");
+  last_->check(one_of)->type_name(Join(choices, "|"));
   return *this;
 }
 
@@ -159,11 +180,15 @@ void Command::Runs(std::function<int()> action) {
 }
 
 CommandLine::CommandLine(const std::string& program, const std::string& summary,
-                         const std::string& version, const std::vector<std::string>& examples)
+                         const std::string& version, const std::vector<std::string>& examples,
+                         const std::string& notes)
     : app_(std::make_unique<CLI::App>(summary, program)), root_(app_.get(), &chosen_) {
   app_->set_version_flag("--version", program + " " + version);
-  app_->footer(Footer(examples));
-  app_->get_formatter()->column_width(34);
+  app_->footer(Footer(examples, notes));
+  const auto formatter = std::make_shared<Formatter>();
+  formatter->column_width(34);
+  formatter->label("REQUIRED", "");
+  app_->formatter(formatter);
 }
 
 CommandLine::~CommandLine() = default;

@@ -62,7 +62,7 @@ class Command {
 class CommandLine {
  public:
   CommandLine(const std::string& program, const std::string& summary, const std::string& version,
-              const std::vector<std::string>& examples);
+              const std::vector<std::string>& examples, const std::string& notes);
   ~CommandLine();
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;

@@ -11,7 +11,9 @@ int main(int argc, char** argv) {
       program::Version(),
       {"exemplar trial submit --skill press trial-*.csv", "exemplar skill learn press",
        "exemplar skill query press --object button=0.45,-0.2,0.06 --format csv",
-       "exemplar skill execute press --object button=0.45,-0.2,0.06 --wait"});
+       "exemplar skill execute press --object button=0.45,-0.2,0.06 --wait"},
+      "Exit codes: 0 done, 2 bad usage, 3 not found, 4 refused as invalid or unsafe,\n"
+      "5 no service answers, 1 anything else.");
   line.root()
       .Option("--server", "HOST:PORT", session.server, "the gateway, or a service directly")
       .FromEnvironment("EXEMPLAR_SERVER")
