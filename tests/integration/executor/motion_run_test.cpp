@@ -1,0 +1,213 @@
+// The control loop's cycle: along the path, at rest where it must be, without allocation.
+
+#include "executor/motion_run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "allocation_count.hpp"
+#include "executor/lateness.hpp"
+#include "executor/path_player.hpp"
+#include "exemplar/base/rng.hpp"
+
+namespace exemplar::executor {
+namespace {
+
+constexpr double kPeriod_s = 0.008;
+
+kinematics::RobotDescription Arm() {
+  return *kinematics::ReadRobotDescription(std::filesystem::path(EXEMPLAR_SOURCE_DIR) / "deploy" /
+                                           "models" / "arm7");
+}
+
+/// The first joint swings to and fro.
+motion::PlannedMotion Swing(const kinematics::RobotDescription& robot, double duration_s) {
+  motion::PlannedMotion plan;
+  const int frames = 101;
+  plan.trajectory.joint_names = robot.chain.joint_names();
+  plan.trajectory.positions = robot.home.transpose().replicate(frames, 1);
+  plan.trajectory.velocities = Eigen::MatrixXd::Zero(frames, robot.chain.dof());
+  const double omega = 2 * M_PI / duration_s;
+  for (int k = 0; k < frames; ++k) {
+    const double t = duration_s * k / (frames - 1);
+    plan.trajectory.time_s.push_back(t);
+    plan.trajectory.positions(k, 0) += 0.2 * (1 - std::cos(omega * t));
+    plan.trajectory.velocities(k, 0) = 0.2 * omega * std::sin(omega * t);
+  }
+  return plan;
+}
+
+collision::CollisionChecker Checker(const kinematics::RobotDescription& robot) {
+  return *collision::CollisionChecker::Create(robot.model, {});
+}
+
+TEST(PathPlayer, StaysOnThePathAtAnySpeed) {
+  const kinematics::RobotDescription robot = Arm();
+  const motion::PlannedMotion plan = Swing(robot, 3);
+  PathPlayer player(plan.trajectory);
+  Rng rng(1);
+  Eigen::VectorXd position(robot.chain.dof());
+  Eigen::VectorXd velocity(robot.chain.dof());
+  Eigen::VectorXd on_path(robot.chain.dof());
+  Eigen::VectorXd unused(robot.chain.dof());
+  double before_s = 0;
+  for (int cycle = 0; cycle < 3000; ++cycle) {
+    player.Advance(kPeriod_s, rng.Uniform(), 3);
+    player.Evaluate(position, velocity);
+    motion::Evaluate(plan.trajectory, player.time_s(), on_path, unused);
+    EXPECT_EQ(position, on_path);
+    EXPECT_GE(player.time_s(), before_s);
+    EXPECT_LE(player.time_s(), before_s + kPeriod_s + 1e-12);
+    before_s = player.time_s();
+  }
+}
+
+TEST(PathPlayer, CommandsTheVelocityThatItMoves) {
+  const kinematics::RobotDescription robot = Arm();
+  const motion::PlannedMotion plan = Swing(robot, 4);
+  PathPlayer player(plan.trajectory);
+  Eigen::VectorXd position(robot.chain.dof());
+  Eigen::VectorXd velocity(robot.chain.dof());
+  player.Advance(1.0, 0.5, 1e6);
+  player.Evaluate(position, velocity);
+  const double before = position[0];
+  const double commanded = velocity[0];
+  player.Advance(1e-5, 0.5, 1e6);
+  player.Evaluate(position, velocity);
+  EXPECT_NEAR((position[0] - before) / 1e-5, commanded, 1e-4);
+}
+
+TEST(PathPlayer, RampsEvenlyAndExactly) {
+  const kinematics::RobotDescription robot = Arm();
+  const motion::PlannedMotion plan = Swing(robot, 4);
+  PathPlayer fine(plan.trajectory);
+  PathPlayer coarse(plan.trajectory);
+  for (int i = 0; i < 1000; ++i) fine.Advance(1e-3, 1, 2);
+  coarse.Advance(1.0, 1, 2);
+  // Half a second of ramp makes a quarter of a second of path.
+  EXPECT_NEAR(coarse.time_s(), 0.75, 1e-12);
+  EXPECT_NEAR(fine.time_s(), 0.75, 1e-9);
+}
+
+class MotionRunTest : public ::testing::Test {
+ protected:
+  MotionRunTest() : robot_(Arm()), run_(robot_, Swing(robot_, 2), Checker(robot_), {}) {}
+
+  void Run(double seconds, State state, double speed = 1) {
+    for (double t = 0; t < seconds - 1e-9; t += kPeriod_s) run_.Tick(kPeriod_s, state, speed);
+  }
+
+  kinematics::RobotDescription robot_;
+  MotionRun run_;
+};
+
+TEST_F(MotionRunTest, DoesNotAllocateInItsCycle) {
+  run_.Tick(kPeriod_s, State::kExecuting, 1);
+  if (!test::AllocationCount::Works()) GTEST_SKIP() << "a sanitizer owns malloc";
+  const test::AllocationCount allocations;
+  for (int i = 0; i < 100; ++i) run_.Tick(kPeriod_s, State::kExecuting, 1);
+  for (int i = 0; i < 100; ++i) run_.Tick(kPeriod_s, State::kPaused, 1);
+  for (int i = 0; i < 100; ++i) run_.AddLateness(std::chrono::microseconds(i));
+  EXPECT_EQ(allocations.count(), 0);
+}
+
+TEST(AllocationCount, SeesWhatEigenAndTheStandardLibraryAllocate) {
+  if (!test::AllocationCount::Works()) GTEST_SKIP() << "a sanitizer owns malloc";
+  const test::AllocationCount allocations;
+  const Eigen::VectorXd some = Eigen::VectorXd::Zero(20);
+  const volatile double* seen = some.data();  // or the compiler leaves the allocation out
+  EXPECT_EQ(seen[3], 0);
+  const int after_eigen = allocations.count();
+  EXPECT_GE(after_eigen, 1);
+  const std::vector<int> more(50, 1);
+  const volatile int* looked_at = more.data();
+  EXPECT_EQ(looked_at[3], 1);
+  EXPECT_GT(allocations.count(), after_eigen);
+}
+
+TEST_F(MotionRunTest, FinishesAtTheEndOfThePathAndHoldsThere) {
+  Run(2.0 + kPauseRamp_s, State::kExecuting);
+  EXPECT_FALSE(run_.finished());
+  Run(kSettle_s + 0.1, State::kExecuting);
+  EXPECT_TRUE(run_.finished());
+  EXPECT_LT((run_.commanded() - robot_.home).norm(), 1e-9);
+}
+
+TEST_F(MotionRunTest, RestsOnThePathWhilePausedAndGoesOn) {
+  Run(1.0, State::kExecuting);
+  Run(kPauseRamp_s + kPeriod_s, State::kPaused);
+  const double rested_s = run_.path_time_s();
+  Run(5.0, State::kPaused);
+  EXPECT_EQ(run_.path_time_s(), rested_s);
+  EXPECT_FALSE(run_.finished());
+  Run(0.5, State::kExecuting);
+  EXPECT_GT(run_.path_time_s(), rested_s + 0.2);
+}
+
+TEST_F(MotionRunTest, ComesToRestWithinTheStatedTimeAfterAFault) {
+  for (const State stopped : {State::kProtectiveStop, State::kEmergencyStop, State::kAborted}) {
+    MotionRun run(robot_, Swing(robot_, 2), Checker(robot_), {});
+    for (double t = 0; t < 0.8; t += kPeriod_s) run.Tick(kPeriod_s, State::kExecuting, 1);
+    const double fault_s = run.path_time_s();
+    for (double t = 0; t < kStopRamp_s; t += kPeriod_s) run.Tick(kPeriod_s, stopped, 1);
+    const double rest_s = run.path_time_s();
+    EXPECT_LE(rest_s - fault_s, 0.5 * kStopRamp_s + kPeriod_s);
+    const Setpoint& held = run.Tick(kPeriod_s, stopped, 1);
+    EXPECT_EQ(held.velocities[0], 0);
+    EXPECT_EQ(run.path_time_s(), rest_s);
+    for (double t = 0; t < kSettle_s; t += kPeriod_s) run.Tick(kPeriod_s, stopped, 1);
+    EXPECT_TRUE(run.finished()) << ToString(stopped);
+  }
+}
+
+TEST_F(MotionRunTest, ReportsTheLargestTrackingErrorOfWhatWasMeasured) {
+  run_.Tick(kPeriod_s, State::kExecuting, 1);
+  MeasuredState state;
+  state.joints = robot_.home;
+  state.joints[2] += 0.03;
+  run_.Measure(state);
+  state.joints[2] -= 0.02;
+  state.touch_n = 4;
+  run_.Measure(state);
+  EXPECT_TRUE(run_.has_unwatched());
+  EXPECT_FALSE(run_.Watch().has_value());
+  EXPECT_FALSE(run_.has_unwatched());
+  api::ExecutionResult result;
+  run_.Report(result);
+  EXPECT_NEAR(result.tracking_error_rad, 0.03, 1e-3);
+  EXPECT_EQ(result.touch_max_n, 4);
+  ASSERT_TRUE(result.touch_onset_s.has_value());
+  EXPECT_EQ(result.base_T_tool.size(), result.tool_time_s.size());
+}
+
+TEST_F(MotionRunTest, NamesTheJointThatDoesNotFollow) {
+  run_.Tick(kPeriod_s, State::kExecuting, 1);
+  MeasuredState state;
+  state.joints = robot_.home;
+  state.joints[4] += 0.5;
+  run_.Measure(state);
+  const std::optional<std::string> wrong = run_.Watch();
+  ASSERT_TRUE(wrong.has_value());
+  EXPECT_NE(wrong->find("joint5"), std::string::npos) << *wrong;
+}
+
+TEST_F(MotionRunTest, SaysWhenTheTouchIsTooStrong) {
+  run_.Tick(kPeriod_s, State::kExecuting, 1);
+  run_.Measure({robot_.home, 200, Duration(0)});
+  const std::optional<std::string> wrong = run_.Watch();
+  ASSERT_TRUE(wrong.has_value());
+  EXPECT_NE(wrong->find("200.0 N"), std::string::npos) << *wrong;
+}
+
+TEST(Lateness, QuantilesAreWithinABinOfTheTruth) {
+  LatenessHistogram histogram;
+  for (int i = 1; i <= 1000; ++i) histogram.Add(std::chrono::microseconds(i));
+  EXPECT_NEAR(histogram.QuantileSeconds(0.99), 990e-6, 0.1 * 990e-6);
+  EXPECT_NEAR(histogram.QuantileSeconds(0.5), 500e-6, 0.1 * 500e-6);
+  EXPECT_DOUBLE_EQ(histogram.max_s(), 1e-3);
+  EXPECT_EQ(histogram.count(), 1000U);
+}
+
+}  // namespace
+}  // namespace exemplar::executor
