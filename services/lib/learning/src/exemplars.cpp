@@ -5,6 +5,7 @@
 
 #include "contact.hpp"
 #include "exemplar/learning/objectivity.hpp"
+#include "rewarp.hpp"
 
 namespace exemplar::learning {
 namespace {
@@ -175,6 +176,7 @@ Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
   for (int o = 0; o < exemplars.objects(); ++o) {
     if (exemplars.object_names[static_cast<std::size_t>(o)] == target) exemplars.target = o;
   }
+  AlignTouches(exemplars);
   exemplars.contacts = FindContacts(exemplars);
   for (ExemplarTrial& trial : exemplars.trials) {
     for (int o = 0; o < exemplars.objects(); ++o) {

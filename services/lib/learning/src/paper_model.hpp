@@ -24,6 +24,7 @@ class PaperModel final : public Model {
   std::vector<geometry::Pose> AbsolutePath(const Situation& situation) const;
   /// False: the trials have no joints and the blend changes nothing.
   bool blends() const { return blends_; }
+  bool through_joints() const { return through_joints_; }
 
  private:
   Eigen::VectorXd Weights(const Situation& situation) const;

@@ -2,15 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/learning/touch.hpp"
+#include "frames_model.hpp"
+#include "method_choice.hpp"
 #include "paper_model.hpp"
 #include "skill_data.hpp"
 #include "trial_checks.hpp"
 
 namespace exemplar::learning {
 namespace {
+
+// A trial whose left-out error is this many times the median is called an outlier.
+constexpr double kOutlierFactor = 3;
 
 Error Cancelled() { return {ErrorCode::kCancelled, "learning was cancelled"}; }
 
@@ -56,6 +61,80 @@ void ReportContact(const Skill::Data& data, SkillReport& report) {
   }
 }
 
+void NameTarget(const Exemplars& exemplars, SkillReport& report) {
+  if (exemplars.target < 0) {
+    report.warnings.push_back(
+        "the trials hold no object: answers differ by the start alone, if at all");
+  } else {
+    report.target = exemplars.object_names[static_cast<std::size_t>(exemplars.target)];
+    if (report.options["target"].empty() && exemplars.objects() > 1) {
+      report.warnings.push_back("no target was named: the paths converge most towards object \"" +
+                                report.target + "\"");
+    }
+  }
+  if (exemplars.size() == 1) {
+    report.warnings.push_back(
+        "one trial only: objectivity and errors cannot be measured, the motion moves with the "
+        "object");
+  }
+}
+
+std::vector<std::string> ChoicesOf(Method method) {
+  if (method == Method::kPaper) return {kPaperChoice};
+  if (method == Method::kFrames) return {kFramesChoice, kFramesByLengthChoice};
+  return {kPaperChoice, kFramesChoice, kFramesByLengthChoice};
+}
+
+// The least left-out error of path and end together.
+std::string Choose(Method method, const Exemplars& exemplars, std::vector<MethodScore>& scores) {
+  if (scores.empty()) {
+    const bool frames = method != Method::kPaper && exemplars.has_tool;
+    return frames || method == Method::kFrames ? kFramesChoice : kPaperChoice;
+  }
+  const auto best = std::min_element(
+      scores.begin(), scores.end(), [](const MethodScore& a, const MethodScore& b) {
+        return a.frechet_m + a.end_error_m < b.frechet_m + b.end_error_m;
+      });
+  best->chosen = true;
+  return best->method;
+}
+
+// What the model did with the trials, and trials that do not fit the others.
+void ReportModel(const Skill::Data& data, SkillReport& report) {
+  if (const auto* frames = dynamic_cast<const FramesModel*>(data.model.get())) {
+    report.notes.push_back(frames->Describe());
+  } else if (const auto* paper = dynamic_cast<const PaperModel*>(data.model.get())) {
+    if (data.exemplars->has_tool && !paper->through_joints()) {
+      report.notes.push_back(
+          "the trials have no joints (or there is no robot model): the paper's method is a plain "
+          "RBF on paths");
+    }
+  }
+  for (const MethodScore& score : report.methods) {
+    const auto n = score.frechet_by_trial_m.size();
+    if (!score.chosen || n < 4 || n != report.trials.size()) continue;
+    for (std::size_t j = 0; j < n; ++j) {
+      if (score.frechet_by_trial_m[j] > kOutlierFactor * score.frechet_m) {
+        report.trials[j].notes.push_back(
+            "outlier: the others predict it " + FormatFixed(score.frechet_by_trial_m[j], 3) +
+            " m away, the median is " + FormatFixed(score.frechet_m, 3) + " m");
+      }
+    }
+  }
+  std::size_t with_touch = 0;
+  std::vector<bool> touched;
+  for (const ExemplarTrial& trial : data.exemplars->trials) {
+    touched.push_back(trial.touch_n.size() > 0 && !FindTouches(trial.touch_n).empty());
+    if (touched.back()) ++with_touch;
+  }
+  for (std::size_t j = 0; with_touch > 0 && j < touched.size(); ++j) {
+    if (!touched[j]) {
+      report.trials[j].notes.push_back("no touch was measured, where " +
+                                       std::to_string(with_touch) + " other trials have it");
+    }
+  }
+}
+
 }  // namespace
 
 const SkillReport& Skill::report() const { return data_->report; }
@@ -68,31 +147,27 @@ Skill Skill::Named(std::string name, int version) const {
   return Skill(std::move(data));
 }
 
-std::unique_ptr<const Model> FitModel(const std::string& /*choices*/, const Exemplars& exemplars,
-                                      std::shared_ptr<const demonstration::ToolKinematics> tool) {
-  return std::make_unique<PaperModel>(exemplars, std::move(tool));
-}
-
 std::shared_ptr<Skill::Data> MakeSkillData(
-    SkillReport report, std::shared_ptr<const Alignment> alignment,
-    std::shared_ptr<const demonstration::ToolKinematics> tool) {
+    SkillReport report, std::shared_ptr<const Alignment> alignment, Exemplars exemplars,
+    std::string choice, std::shared_ptr<const demonstration::ToolKinematics> tool) {
   auto data = std::make_shared<Skill::Data>();
   data->report = std::move(report);
   data->alignment = std::move(alignment);
   data->tool = std::move(tool);
-  data->exemplars = std::make_shared<const Exemplars>(
-      BuildExemplars(*data->alignment, data->report.target, data->tool.get()));
-  const Exemplars& exemplars = *data->exemplars;
-  for (int o = 0; o < exemplars.objects(); ++o) {
+  data->choice = std::move(choice);
+  data->exemplars =
+      std::make_shared<const Exemplars>(ExemplarsFor(data->choice, std::move(exemplars)));
+  data->model = FitModel(data->choice, *data->exemplars, data->tool);
+  for (int o = 0; o < data->exemplars->objects(); ++o) {
     std::vector<Eigen::Quaterniond> rotations;
-    for (const ExemplarTrial& trial : exemplars.trials) {
+    for (const ExemplarTrial& trial : data->exemplars->trials) {
       rotations.push_back(trial.situation.base_T_object[static_cast<std::size_t>(o)].rotation);
     }
     data->mean_object_rotation.push_back(geometry::MeanRotation(rotations));
   }
-  for (const ContactSpan& contact : exemplars.contacts) {
-    data->contact_points.push_back(exemplars.has_tool ? MeanContactPoint(exemplars, contact)
-                                                      : ContactPoint{});
+  for (const ContactSpan& contact : data->exemplars->contacts) {
+    data->contact_points.push_back(
+        data->exemplars->has_tool ? MeanContactPoint(*data->exemplars, contact) : ContactPoint{});
   }
   return data;
 }
@@ -136,7 +211,6 @@ Result<Skill> LearnSkill(std::span<const NamedTrial> trials, const LearnOptions&
   tell(0.7, "interpolation");
   auto alignment = std::make_shared<const Alignment>(std::move(*aligned));
   report.options = options.ToStrings();
-  report.target = options.target;
   report.frames = static_cast<int>(alignment->time_s.size());
   report.duration_s = alignment->time_s.back();
   report.mean_correlation = alignment->mean_correlation;
@@ -144,30 +218,21 @@ Result<Skill> LearnSkill(std::span<const NamedTrial> trials, const LearnOptions&
   report.markers_s = alignment->knots_s;
   report.warnings.insert(report.warnings.end(), alignment->warnings.begin(),
                          alignment->warnings.end());
-  std::shared_ptr<Skill::Data> data = MakeSkillData(std::move(report), alignment, tool);
-  const Exemplars& exemplars = *data->exemplars;
-  SkillReport& final_report = data->report;
-  final_report.joint_names = exemplars.joint_names;
-  if (exemplars.target >= 0) {
-    if (final_report.target.empty() && exemplars.objects() > 1) {
-      final_report.warnings.push_back(
-          "no target was named: the paths converge most towards object \"" +
-          exemplars.object_names[static_cast<std::size_t>(exemplars.target)] + "\"");
-    }
-    final_report.target = exemplars.object_names[static_cast<std::size_t>(exemplars.target)];
-  } else {
-    final_report.warnings.push_back("the trials hold no object: every answer is the same motion");
-  }
-  if (exemplars.size() == 1) {
-    final_report.warnings.push_back(
-        "one trial only: objectivity and errors cannot be measured, the motion moves with the "
-        "object from contact on");
-  }
-  ReportTrials(*alignment, exemplars, final_report);
-  ReportContact(*data, final_report);
-  final_report.method = "paper";
-  data->choices = "paper";
-  data->model = FitModel(data->choices, exemplars, tool);
+  Exemplars exemplars = BuildExemplars(*alignment, options.target, tool.get());
+  NameTarget(exemplars, report);
+  report.methods = ScoreMethods(
+      ChoicesOf(options.method), exemplars, tool,
+      [&](double fraction, std::string_view step) { tell(0.7 + 0.3 * fraction, step); }, stop);
+  if (stop.stop_requested()) return Cancelled();
+  const std::string choice = Choose(options.method, exemplars, report.methods);
+  report.method = choice.substr(0, choice.find(' '));
+  report.joint_names = exemplars.joint_names;
+
+  std::shared_ptr<Skill::Data> data =
+      MakeSkillData(std::move(report), alignment, std::move(exemplars), choice, tool);
+  ReportTrials(*alignment, *data->exemplars, data->report);
+  ReportContact(*data, data->report);
+  ReportModel(*data, data->report);
   tell(1.0, "done");
   return Skill(std::move(data));
 }

@@ -262,6 +262,7 @@ SkillReport ToReport(const json& j) {
   report.mean_correlation = j.at("mean_correlation").get<double>();
   report.plain_correlation = j.at("plain_correlation").get<double>();
   for (const json& score : j.at("methods")) report.methods.push_back(ToScore(score));
+  report.notes = j.at("notes").get<std::vector<std::string>>();
   report.warnings = j.at("warnings").get<std::vector<std::string>>();
   return report;
 }
@@ -320,6 +321,7 @@ json ToJson(const SkillReport& report) {
           {"mean_correlation", report.mean_correlation},
           {"plain_correlation", report.plain_correlation},
           {"methods", std::move(methods)},
+          {"notes", report.notes},
           {"warnings", report.warnings}};
 }
 
@@ -327,7 +329,7 @@ json ToJson(const Skill& skill) {
   return {{"format", kFormat},
           {"report", ToJson(skill.report())},
           {"alignment", FromAlignment(skill.alignment())},
-          {"model", skill.data().choices}};
+          {"model", skill.data().choice}};
 }
 
 Result<Skill> SkillFromJson(const json& stored,
@@ -352,12 +354,10 @@ Result<Skill> SkillFromJson(const json& stored,
         }
       }
     }
-    auto choices = stored.at("model").get<std::string>();
-    std::shared_ptr<Skill::Data> data =
-        MakeSkillData(std::move(report), std::move(alignment), std::move(tool));
-    data->choices = std::move(choices);
-    data->model = FitModel(data->choices, *data->exemplars, data->tool);
-    return Skill(std::move(data));
+    auto choice = stored.at("model").get<std::string>();
+    Exemplars exemplars = BuildExemplars(*alignment, report.target, tool.get());
+    return Skill(MakeSkillData(std::move(report), std::move(alignment), std::move(exemplars),
+                               std::move(choice), std::move(tool)));
   } catch (const json::exception& e) {
     return Error{ErrorCode::kDataLoss, std::string("skill JSON: ") + e.what(), "skill"};
   }

@@ -52,6 +52,7 @@ struct SkillReport {
   double contact_spread_m = 0;
   double mean_correlation = 0, plain_correlation = 0;
   std::vector<MethodScore> methods;
+  std::vector<std::string> notes;  ///< what was chosen, and why
   std::vector<std::string> warnings;
 };
 

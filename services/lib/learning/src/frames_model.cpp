@@ -1,0 +1,193 @@
+#include "frames_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "exemplar/learning/objectivity.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+double Smoothstep(double s) {
+  const double x = std::clamp(s, 0.0, 1.0);
+  return x * x * (3 - 2 * x);
+}
+
+// Trend and ridge of the joints' interpolation by closed-form leave-one-out error.
+CardinalRbf ChooseStyle(const Exemplars& exemplars) {
+  const int width = exemplars.target < 0 ? 0 : 3;
+  Eigen::MatrixXd positions(exemplars.size(), width);
+  // One row a trial; every tenth frame tells enough.
+  const int step = std::max(1, exemplars.frames / 60);
+  const int rows = (exemplars.frames + step - 1) / step;
+  Eigen::MatrixXd samples(exemplars.size(), rows * exemplars.joints());
+  for (int j = 0; j < exemplars.size(); ++j) {
+    const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
+    if (width > 0) {
+      positions.row(j) = trial.situation.base_T_object[static_cast<std::size_t>(exemplars.target)]
+                             .translation.transpose();
+    }
+    for (int k = 0; k < exemplars.joints(); ++k) {
+      for (int r = 0; r < rows; ++r) samples(j, k * rows + r) = trial.joints(r * step, k);
+    }
+  }
+  RbfOptions best{.trend = Trend::kConstant, .ridge = 0.1};
+  double least = std::numeric_limits<double>::infinity();
+  if (samples.cols() > 0 && exemplars.size() > 2) {
+    for (const Trend trend : {Trend::kConstant, Trend::kAffine}) {
+      for (const double ridge : {0.0, 0.1, 1.0}) {
+        const RbfOptions options{.trend = trend, .ridge = ridge};
+        const double error = CardinalRbf(positions, options).LeaveOneOut(samples).squaredNorm();
+        if (error < least * (1 - 1e-6)) {
+          least = error;
+          best = options;
+        }
+      }
+    }
+  }
+  return CardinalRbf(positions, best);
+}
+
+}  // namespace
+
+FramesModel::FramesModel(const Exemplars& exemplars)
+    : frames_(exemplars.frames),
+      target_(exemplars.target),
+      joints_count_(exemplars.joints()),
+      contacts_(exemplars.contacts) {
+  const int n = exemplars.size();
+  style_ = ChooseStyle(exemplars);
+  joints_ = Bundle(frames_, joints_count_, n);
+  if (exemplars.trials[0].hand.size() > 0) hand_ = Bundle(frames_, 1, n);
+  for (int j = 0; j < n; ++j) {
+    const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
+    joints_.Set(j, trial.joints);
+    if (!hand_.empty()) hand_.Set(j, trial.hand);
+  }
+  objectivity_ = Eigen::MatrixXd::Zero(frames_, exemplars.objects());
+  if (!exemplars.has_tool) return;
+
+  path_.emplace(exemplars);
+  rotation_.emplace(exemplars, *path_);
+  for (const ContactSpan& contact : contacts_) {
+    contact_points_.push_back(MeanContactPoint(exemplars, contact));
+  }
+  std::vector<Eigen::MatrixXd> base;
+  for (int j = 0; j < n; ++j) base.push_back(exemplars.BasePath(j));
+  for (int o = 0; o < exemplars.objects(); ++o) {
+    if (o == target_) {
+      objectivity_.col(o) = 1.0 - path_->start_share().array();
+      continue;
+    }
+    std::vector<Eigen::MatrixXd> shifted;
+    for (int j = 0; j < n; ++j) shifted.push_back(exemplars.ShiftedPath(j, o));
+    objectivity_.col(o) = ComputeObjectivity(base, shifted, exemplars.FirstContact(o)).upsilon;
+  }
+}
+
+Eigen::VectorXd FramesModel::StyleWeights(const Situation& situation) const {
+  if (target_ < 0) return style_->Weights(Eigen::VectorXd());
+  return style_->Weights(situation.base_T_object[static_cast<std::size_t>(target_)].translation);
+}
+
+void FramesModel::MeetContacts(const Situation& situation, Prediction& prediction) const {
+  for (std::size_t k = 0; k < contacts_.size(); ++k) {
+    const ContactSpan& span = contacts_[k];
+    Eigen::Vector3d& reached = prediction.tool[static_cast<std::size_t>(span.first)].translation;
+    if (span.touch_measured) {
+      const geometry::Pose& base_T_object =
+          situation.base_T_object[static_cast<std::size_t>(span.object)];
+      const ContactPoint& point = contact_points_[k];
+      const Eigen::Vector3d wanted = point.turns
+                                         ? base_T_object * point.object_p_contact
+                                         : base_T_object.translation + point.object_p_contact;
+      const Eigen::Vector3d shift = wanted - reached;
+      const int before = k > 0 ? contacts_[k - 1].last : 0;
+      const int after = k + 1 < contacts_.size() ? contacts_[k + 1].first : frames_ - 1;
+      for (int i = before + 1; i < std::max(after, span.last + 1); ++i) {
+        double share = 1;
+        if (i < span.first)
+          share = Smoothstep(static_cast<double>(i - before) / (span.first - before));
+        if (i > span.last) share = Smoothstep(static_cast<double>(after - i) / (after - span.last));
+        prediction.tool[static_cast<std::size_t>(i)].translation += share * shift;
+      }
+      reached = wanted;
+    }
+    prediction.contact_points.push_back(reached);
+  }
+}
+
+Prediction FramesModel::Predict(const Situation& situation) const {
+  Prediction prediction;
+  const Eigen::VectorXd weights = StyleWeights(situation);
+  prediction.joints.resize(frames_, joints_count_);
+  if (joints_count_ > 0) {
+    const Eigen::VectorXd stacked = joints_.Sum(weights);
+    for (int i = 0; i < frames_; ++i) {
+      prediction.joints.row(i) = stacked.segment(i * joints_count_, joints_count_).transpose();
+    }
+  }
+  if (!hand_.empty()) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
+  prediction.objectivity = objectivity_;
+  Eigen::VectorXd start_share = Eigen::VectorXd::Zero(frames_);
+  if (path_.has_value()) {
+    start_share = path_->start_share();
+    const FrameSituation where = path_->From(situation);
+    PathFrames::Answer answer = path_->Predict(where);
+    const std::vector<Eigen::Quaterniond> rotations = rotation_->Predict(situation, where);
+    // What the noise of the trials leaves between the answer's first frame and the start.
+    const Eigen::Vector3d missing = where.start - answer.positions.col(0);
+    prediction.tool.resize(static_cast<std::size_t>(frames_));
+    for (int i = 0; i < frames_; ++i) {
+      prediction.tool[static_cast<std::size_t>(i)] = {
+          answer.positions.col(i) + start_share[i] * missing,
+          rotations[static_cast<std::size_t>(i)]};
+    }
+    prediction.sigma_m = std::move(answer.sigma_m);
+    MeetContacts(situation, prediction);
+    if (situation.base_T_start.has_value()) {
+      prediction.tool[0].translation = where.start;
+      if (situation.start_has_orientation) {
+        prediction.tool[0].rotation = situation.base_T_start->rotation;
+      }
+    } else {
+      prediction.warnings.push_back(
+          "no start was given: the motion begins where the trials began on average");
+    }
+    if (rotation_->assumed() && target_ >= 0) {
+      const Eigen::Quaterniond shown(path_->shown_turn());
+      const double angle = geometry::AngleBetween(
+          shown, situation.base_T_object[static_cast<std::size_t>(target_)].rotation);
+      if (angle > 0.1) {
+        prediction.warnings.push_back(
+            "the trials never turned the object: that the motion turns with it is assumed");
+      }
+    }
+  }
+  if (situation.joint_start.has_value() && joints_count_ > 0) {
+    // Joints leave their start as the tool does; without a tool, over the first third.
+    const Eigen::RowVectorXd missing =
+        situation.joint_start->transpose() - prediction.joints.row(0);
+    for (int i = 0; i < frames_; ++i) {
+      const double share =
+          path_.has_value() ? start_share[i] : 1 - Smoothstep(3.0 * i / std::max(1, frames_ - 1));
+      prediction.joints.row(i) += share * missing;
+    }
+    prediction.joints.row(0) = situation.joint_start->transpose();
+  }
+  return prediction;
+}
+
+std::optional<Eigen::Matrix3Xd> FramesModel::LeftOut(int trial) const {
+  if (!path_.has_value()) return std::nullopt;
+  return path_->LeftOut(trial);
+}
+
+std::string FramesModel::Describe() const {
+  if (!path_.has_value()) return "joints";
+  return "position: " + path_->Describe() +
+         "; orientation: " + (rotation_->turns_with_object() ? "object" : "world");
+}
+
+}  // namespace exemplar::learning

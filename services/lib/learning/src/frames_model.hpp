@@ -1,0 +1,42 @@
+#pragma once
+// method=frames: positions and orientations each in the frames that predict left-out trials best.
+
+#include <optional>
+
+#include "contact.hpp"
+#include "exemplar/learning/rbf.hpp"
+#include "exemplars.hpp"
+#include "path_frames.hpp"
+#include "prediction.hpp"
+#include "rotation_frames.hpp"
+
+namespace exemplar::learning {
+
+/// Begins exactly at the situation's start; meets the trials' mean contact point where touch was
+/// measured. Immutable.
+class FramesModel final : public Model {
+ public:
+  explicit FramesModel(const Exemplars& exemplars);
+  Prediction Predict(const Situation& situation) const override;
+
+  /// Tool path of a training trial as the others predict it (closed form), base frame.
+  std::optional<Eigen::Matrix3Xd> LeftOut(int trial) const;
+  std::string Describe() const;
+
+ private:
+  Eigen::VectorXd StyleWeights(const Situation& situation) const;
+  void MeetContacts(const Situation& situation, Prediction& prediction) const;
+
+  int frames_ = 0;
+  int target_ = -1;
+  int joints_count_ = 0;
+  std::vector<ContactSpan> contacts_;
+  std::vector<ContactPoint> contact_points_;
+  std::optional<PathFrames> path_;
+  std::optional<RotationFrames> rotation_;
+  std::optional<CardinalRbf> style_;  // of joints and hand, over the target's position
+  Bundle joints_, hand_;
+  Eigen::MatrixXd objectivity_;
+};
+
+}  // namespace exemplar::learning

@@ -1,0 +1,221 @@
+#include "path_frames.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "exemplar/base/text.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+// The start and what turns with the object are always there: their gains are large enough to leave
+// them to the data.
+constexpr double kStartGain = 5e3;
+constexpr double kObjectGain = 1e5;
+// The best gains are averaged with shares that fall with this power of their left-out score.
+constexpr std::size_t kMembers = 8;
+constexpr double kSharpness = 16;
+// Gains are chosen on at most this many trials; the answer uses all.
+constexpr int kMostForChoice = 40;
+
+std::vector<FrameGains> Grid(bool turns) {
+  std::vector<FrameGains> grid;
+  for (const double world : {0.0, 1.0, 10.0, 100.0}) {
+    // Without orientation the object's part is the world's.
+    if (!turns && world > 0) continue;
+    for (const double start_axes : {0.0, 5.0, 100.0}) {
+      grid.push_back({.start_axes = start_axes, .world = world, .residual = 0});
+      grid.push_back({.start_axes = start_axes, .world = world, .residual = 1});
+      grid.push_back({.start_axes = start_axes, .world = world, .residual = 5});
+      grid.push_back({.start_axes = start_axes,
+                      .world = world,
+                      .residual = 5,
+                      .residual_turns = true,
+                      .by_orientation = false});
+    }
+  }
+  return grid;
+}
+
+}  // namespace
+
+PathFrames::PathFrames(const Exemplars& exemplars) : target_(exemplars.target) {
+  const int n = exemplars.size();
+  turns_ = target_ >= 0 && exemplars.object_has_orientation[static_cast<std::size_t>(target_)];
+  for (const ExemplarTrial& trial : exemplars.trials) {
+    mean_start_ += trial.tool.front().translation / n;
+  }
+  values_.resize(3 * n, exemplars.frames);
+  double squared = 0;
+  double extent = 0;
+  for (int j = 0; j < n; ++j) {
+    const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
+    FrameSituation situation = From(trial.situation);
+    situation.start = trial.tool.front().translation;
+    const Eigen::MatrixXd path =
+        target_ >= 0 ? exemplars.ShiftedPath(j, target_) : exemplars.BasePath(j);
+    values_.middleRows<3>(3 * j) = path.transpose();
+    if (target_ < 0) values_.middleRows<3>(3 * j).colwise() -= mean_start_;
+    squared += (situation.start - situation.object).squaredNorm() / n;
+    extent = std::max(extent, (path.rowwise() - path.row(0)).rowwise().norm().maxCoeff());
+    situations_.push_back(situation);
+  }
+  length_m_ = std::max({std::sqrt(squared), 0.05 * extent, 1e-9});
+  Fit(Grid(turns_));
+}
+
+FrameSituation PathFrames::From(const Situation& situation) const {
+  FrameSituation result;
+  result.start =
+      situation.base_T_start.has_value() ? situation.base_T_start->translation : mean_start_;
+  if (target_ < 0) {
+    result.object = mean_start_;
+    return result;
+  }
+  const geometry::Pose& object = situation.base_T_object[static_cast<std::size_t>(target_)];
+  result.object = object.translation;
+  if (turns_) result.turn = object.rotation.toRotationMatrix();
+  return result;
+}
+
+Eigen::MatrixXd PathFrames::Covariance(const FrameSituation& a, const FrameSituation& b,
+                                       const FrameGains& gains) const {
+  const Eigen::Vector3d from_a = (a.start - a.object) / length_m_;
+  const Eigen::Vector3d from_b = (b.start - b.object) / length_m_;
+  const Eigen::Matrix3d turn = a.turn * b.turn.transpose();
+  Eigen::Matrix3d block = kStartGain * from_a * from_b.transpose() + kObjectGain * turn;
+  if (gains.start_axes > 0) {
+    const Eigen::Vector3d along =
+        (a.turn.transpose() * from_a).cwiseProduct(b.turn.transpose() * from_b);
+    block += gains.start_axes * a.turn * along.asDiagonal() * b.turn.transpose();
+  }
+  if (gains.world > 0) block.diagonal().array() += gains.world;
+  if (gains.residual > 0) {
+    double squared = (from_a - from_b).squaredNorm();
+    if (gains.by_orientation) {
+      squared += 0.25 * (a.turn.leftCols<2>() - b.turn.leftCols<2>()).squaredNorm();
+    }
+    const double similarity = gains.residual * std::exp(-std::sqrt(squared));
+    if (gains.residual_turns) {
+      block += similarity * turn;
+    } else {
+      block.diagonal().array() += similarity;
+    }
+  }
+  return block;
+}
+
+void PathFrames::Fit(const std::vector<FrameGains>& grid) {
+  const int n = static_cast<int>(situations_.size());
+  const auto covariance = [&](const std::vector<int>& chosen, const FrameGains& gains) {
+    const auto m = static_cast<Eigen::Index>(chosen.size());
+    Eigen::MatrixXd matrix(3 * m, 3 * m);
+    for (Eigen::Index i = 0; i < m; ++i) {
+      for (Eigen::Index j = i; j < m; ++j) {
+        const Eigen::Matrix3d block = Covariance(
+            situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])],
+            situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(j)])], gains);
+        matrix.block<3, 3>(3 * i, 3 * j) = block;
+        matrix.block<3, 3>(3 * j, 3 * i) = block.transpose();
+      }
+    }
+    return matrix;
+  };
+  std::vector<int> all;
+  for (int j = 0; j < n; ++j) all.push_back(j);
+  std::vector<int> few = all;
+  if (n > kMostForChoice) {
+    few.clear();
+    for (int k = 0; k < kMostForChoice; ++k) few.push_back(k * n / kMostForChoice);
+  }
+  Eigen::MatrixXd few_values(3 * static_cast<Eigen::Index>(few.size()), values_.cols());
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    few_values.middleRows<3>(3 * static_cast<Eigen::Index>(k)) = values_.middleRows<3>(3 * few[k]);
+  }
+
+  struct Candidate {
+    double score = 0;
+    const FrameGains* gains = nullptr;
+  };
+  std::vector<Candidate> candidates;
+  for (const FrameGains& gains : grid) {
+    // One trial predicts nothing about itself: the plainest gains.
+    const double score =
+        n > 1 ? LeftOutScore(BlockKriging(covariance(few, gains), few_values).left_out_errors())
+              : 1.0;
+    candidates.push_back({score, &gains});
+    if (n == 1) break;
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
+  if (candidates.size() > kMembers) candidates.resize(kMembers);
+  double total = 0;
+  for (const Candidate& candidate : candidates) {
+    const double ratio = candidate.score > 0 ? candidates.front().score / candidate.score : 1.0;
+    const double share = std::pow(ratio, kSharpness);
+    total += share;
+    members_.push_back({.gains = *candidate.gains,
+                        .share = share,
+                        .kriging = BlockKriging(covariance(all, *candidate.gains), values_)});
+  }
+  start_share_ = Eigen::VectorXd::Zero(values_.cols());
+  for (Member& member : members_) {
+    member.share /= total;
+    // Posterior means of a, and of A's trace over 3.
+    const Eigen::MatrixXd duals = member.kriging.Duals(values_);
+    for (int j = 0; j < n; ++j) {
+      const FrameSituation& s = situations_[static_cast<std::size_t>(j)];
+      const Eigen::Vector3d from = (s.start - s.object) / length_m_;
+      start_share_ += member.share * (kStartGain + member.gains.start_axes / 3) *
+                      (from.transpose() * duals.middleRows<3>(3 * j)).transpose();
+    }
+  }
+  // Where starts and objects never varied apart, the parts share what they explain: relative to the
+  // first frame, which is the start's altogether, the shape is still right.
+  const double first = start_share_[0];
+  if (first > 1e-6) start_share_ /= first;
+  start_share_ = start_share_.cwiseMax(0.0).cwiseMin(1.0);
+}
+
+PathFrames::Answer PathFrames::Predict(const FrameSituation& situation) const {
+  const auto n = static_cast<Eigen::Index>(situations_.size());
+  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(3, 3 * n);
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(values_.cols());
+  Eigen::MatrixXd cross(3, 3 * n);
+  for (const Member& member : members_) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      cross.middleCols<3>(3 * j) =
+          Covariance(situation, situations_[static_cast<std::size_t>(j)], member.gains);
+    }
+    const Eigen::MatrixXd own = member.kriging.Weights(cross);
+    weights += member.share * own;
+    const double known =
+        (Covariance(situation, situation, member.gains) - own * cross.transpose()).trace();
+    variance += member.share * (3 + std::max(0.0, known)) * member.kriging.noise_variance();
+  }
+  Answer answer;
+  answer.positions.noalias() = weights * values_;
+  answer.positions.colwise() += situation.object;
+  answer.sigma_m = variance.cwiseSqrt();
+  return answer;
+}
+
+Eigen::Matrix3Xd PathFrames::LeftOut(int trial) const {
+  Eigen::Matrix3Xd path = values_.middleRows<3>(3 * trial);
+  for (const Member& member : members_) {
+    path -= member.share * member.kriging.left_out_errors().middleRows<3>(3 * trial);
+  }
+  path.colwise() += situations_[static_cast<std::size_t>(trial)].object;
+  return path;
+}
+
+std::string PathFrames::Describe() const {
+  const FrameGains& best = members_.front().gains;
+  std::string text = turns_ ? "start, turned object" : "start, object";
+  if (best.start_axes > 0) text += ", start along the object's axes";
+  if (best.world > 0) text += ", world";
+  if (best.residual > 0) text += ", smooth rest";
+  return text;
+}
+
+}  // namespace exemplar::learning

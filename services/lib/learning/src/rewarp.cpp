@@ -1,0 +1,165 @@
+#include "rewarp.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact.hpp"
+#include "exemplar/learning/touch.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+// Part of time in a trial's phase; the rest is path length. A pause still takes its share.
+constexpr double kTimePart = 0.3;
+
+// Value at `x` of the polyline through (xs, ys), xs increasing; held outside.
+double Lookup(std::span<const double> xs, std::span<const double> ys, double x) {
+  const auto after = std::upper_bound(xs.begin(), xs.end(), x);
+  if (after == xs.begin()) return ys.front();
+  if (after == xs.end()) return ys.back();
+  const auto k = static_cast<std::size_t>(after - xs.begin());
+  const double s = (x - xs[k - 1]) / (xs[k] - xs[k - 1]);
+  return ys[k - 1] + s * (ys[k] - ys[k - 1]);
+}
+
+std::vector<double> Frames(int frames) {
+  std::vector<double> all(static_cast<std::size_t>(frames));
+  for (int i = 0; i < frames; ++i) all[static_cast<std::size_t>(i)] = i;
+  return all;
+}
+
+// 0 to 1 along the trial, strictly increasing; at the boundaries of measured contacts it equals
+// their part of the frames.
+std::vector<double> Phase(const Exemplars& exemplars, const ExemplarTrial& trial) {
+  const int n = exemplars.frames;
+  std::vector<int> anchors = {0};
+  for (const ContactSpan& contact : exemplars.contacts) {
+    if (!contact.touch_measured) continue;
+    for (const int frame : {contact.first, contact.last}) {
+      if (frame > anchors.back() && frame < n - 1) anchors.push_back(frame);
+    }
+  }
+  anchors.push_back(n - 1);
+  std::vector<double> phase(static_cast<std::size_t>(n), 0.0);
+  for (std::size_t a = 1; a < anchors.size(); ++a) {
+    const int begin = anchors[a - 1];
+    const int end = anchors[a];
+    std::vector<double> length = {0};
+    for (int i = begin + 1; i <= end; ++i) {
+      length.push_back(length.back() + (trial.tool[static_cast<std::size_t>(i)].translation -
+                                        trial.tool[static_cast<std::size_t>(i - 1)].translation)
+                                           .norm());
+    }
+    const double whole = length.back();
+    for (int i = begin; i <= end; ++i) {
+      const double time = static_cast<double>(i - begin) / (end - begin);
+      const double way = whole > 0 ? length[static_cast<std::size_t>(i - begin)] / whole : time;
+      const double part = kTimePart * time + (1 - kTimePart) * way;
+      phase[static_cast<std::size_t>(i)] = (begin + part * (end - begin)) / (n - 1);
+    }
+  }
+  return phase;
+}
+
+}  // namespace
+
+ExemplarTrial Rewarped(const ExemplarTrial& trial, std::span<const double> from) {
+  ExemplarTrial result = trial;
+  const auto sample = [&](const std::vector<geometry::Pose>& path) {
+    std::vector<geometry::Pose> sampled;
+    for (const double at : from) {
+      const double whole = std::clamp(std::floor(at), 0.0, static_cast<double>(path.size() - 1));
+      const auto k = static_cast<std::size_t>(whole);
+      const double s = std::clamp(at - whole, 0.0, 1.0);
+      sampled.push_back(
+          s > 0 && k + 1 < path.size() ? geometry::Interpolate(path[k], path[k + 1], s) : path[k]);
+    }
+    return sampled;
+  };
+  const auto mix = [&](const Eigen::MatrixXd& rows) {
+    Eigen::MatrixXd sampled(static_cast<Eigen::Index>(from.size()), rows.cols());
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      const double whole =
+          std::clamp(std::floor(from[i]), 0.0, static_cast<double>(rows.rows() - 1));
+      const auto k = static_cast<Eigen::Index>(whole);
+      const double s = std::clamp(from[i] - whole, 0.0, 1.0);
+      const auto row = static_cast<Eigen::Index>(i);
+      sampled.row(row) = rows.row(k);
+      if (s > 0 && k + 1 < rows.rows()) sampled.row(row) += s * (rows.row(k + 1) - rows.row(k));
+    }
+    return sampled;
+  };
+  if (!trial.tool.empty()) result.tool = sample(trial.tool);
+  for (std::vector<geometry::Pose>& path : result.moving) {
+    if (!path.empty()) path = sample(path);
+  }
+  if (trial.joints.cols() > 0) result.joints = mix(trial.joints);
+  if (trial.hand.size() > 0) result.hand = mix(trial.hand);
+  if (trial.touch_n.size() > 0) result.touch_n = mix(trial.touch_n);
+  return result;
+}
+
+void AlignTouches(Exemplars& exemplars) {
+  std::vector<std::vector<double>> knots;
+  for (const ExemplarTrial& trial : exemplars.trials) {
+    if (trial.touch_n.size() == 0) return;
+    std::vector<double> own = {0};
+    for (const Touch& touch : FindTouches(trial.touch_n)) {
+      for (const int frame : {touch.first, touch.last}) {
+        if (frame > own.back() && frame < exemplars.frames - 1) own.push_back(frame);
+      }
+    }
+    own.push_back(exemplars.frames - 1);
+    if (!knots.empty() && own.size() != knots.front().size()) return;
+    knots.push_back(std::move(own));
+  }
+  if (knots.front().size() == 2) return;
+  std::vector<double> mean(knots.front().size(), 0.0);
+  for (const std::vector<double>& own : knots) {
+    for (std::size_t k = 0; k < mean.size(); ++k) {
+      mean[k] += own[k] / static_cast<double>(knots.size());
+    }
+  }
+  // Whole frames, so that the onset is a sample of the common time base; still increasing.
+  for (double& frame : mean) frame = std::round(frame);
+  for (std::size_t k = 1; k < mean.size(); ++k) {
+    if (mean[k] <= mean[k - 1]) return;
+  }
+  const std::vector<double> all = Frames(exemplars.frames);
+  for (std::size_t j = 0; j < knots.size(); ++j) {
+    std::vector<double> from;
+    for (const double frame : all) from.push_back(Lookup(mean, knots[j], frame));
+    exemplars.trials[j] = Rewarped(exemplars.trials[j], from);
+  }
+}
+
+Exemplars AlignedByLength(const Exemplars& exemplars) {
+  Exemplars result = exemplars;
+  const int n = exemplars.frames;
+  if (!exemplars.has_tool || n < 3) return result;
+  const std::vector<double> all = Frames(n);
+  std::vector<std::vector<double>> phases;
+  // Mean time of each phase, on a grid as fine as the frames.
+  std::vector<double> grid;
+  std::vector<double> mean(static_cast<std::size_t>(n), 0.0);
+  for (const double frame : all) grid.push_back(frame / (n - 1));
+  for (const ExemplarTrial& trial : exemplars.trials) {
+    phases.push_back(Phase(exemplars, trial));
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      mean[i] += Lookup(phases.back(), all, grid[i]) / exemplars.size();
+    }
+  }
+  for (std::size_t j = 0; j < phases.size(); ++j) {
+    std::vector<double> from;
+    for (const double frame : all) {
+      from.push_back(Lookup(phases[j], all, Lookup(mean, grid, frame)));
+    }
+    from.front() = 0;
+    from.back() = n - 1;
+    result.trials[j] = Rewarped(exemplars.trials[j], from);
+  }
+  result.contacts = FindContacts(result);
+  return result;
+}
+
+}  // namespace exemplar::learning
