@@ -22,12 +22,9 @@ Result<api::RecordStart> ParseStart(const std::map<std::string, std::string>& ar
         return InvalidArgument("timeout_s: \"" + value + "\" is not a number", "timeout_s");
       }
       start.timeout_s = *seconds;
-    } else if (name.starts_with(kMetaPrefix) && name.size() > kMetaPrefix.size()) {
-      start.metadata[name.substr(kMetaPrefix.size())] = value;
     } else {
-      return InvalidArgument(
-          "argument \"" + name + "\" is unknown; start takes name, meta.KEY, expect, timeout_s",
-          name);
+      const bool prefixed = name.starts_with(kMetaPrefix) && name.size() > kMetaPrefix.size();
+      start.metadata[prefixed ? name.substr(kMetaPrefix.size()) : name] = value;
     }
   }
   return start;

@@ -4,9 +4,10 @@
 
 namespace exemplar::recorder {
 
-/// Commands of ircp/recorder/command: "start" (arguments `name`, `meta.KEY`, `expect` as topics
-/// separated by commas, `timeout_s`; all optional), "stop", "pause", "resume", "status". The
-/// answer's values: `state`, `file`, `messages`, `bytes`, `duration_s`, `sent`, `received`, `lost`.
+/// Commands of ircp/recorder/command: "start" (arguments `name`, `expect` as topics separated by
+/// commas, `timeout_s`; all optional; `meta.KEY` and every other one is kept in the file), "stop",
+/// "pause", "resume", "status". The answer's values: `state`, `file`, `messages`, `bytes`,
+/// `duration_s`, `sent`, `received`, `lost`.
 ircp::Answer AnswerCommand(api::RecorderApi& recorder, const ircp::CommandSample& command);
 
 /// The same values, for the status topic.

@@ -46,11 +46,7 @@ class RecorderImpl final : public Recorder {
         options_(std::move(options)) {}
 
   ~RecorderImpl() override {
-    if (HasFile()) {
-      if (const Result<api::RecorderStatus> stopped = Stop(); !stopped.ok()) {
-        log_.Error("recording not closed", {{"error", stopped.error().message}});
-      }
-    }
+    Close();
     tap_.reset();  // no callback comes after this
   }
 
@@ -116,6 +112,11 @@ class RecorderImpl final : public Recorder {
 
   Result<api::RecorderStatus> Stop() override {
     const std::lock_guard control(control_mutex_);
+    return StopHeld();
+  }
+
+  /// Precondition: control_mutex_ is held.
+  Result<api::RecorderStatus> StopHeld() {
     bool stopped_already = false;
     {
       const std::lock_guard lock(mutex_);
@@ -163,6 +164,21 @@ class RecorderImpl final : public Recorder {
 
   Result<api::RecorderStatus> Pause() override { return Switch(Event::kPause, "paused"); }
   Result<api::RecorderStatus> Resume() override { return Switch(Event::kResume, "recording"); }
+
+  void Close() override {
+    const std::lock_guard control(control_mutex_);
+    if (HasFile()) {
+      if (const Result<api::RecorderStatus> stopped = StopHeld(); !stopped.ok()) {
+        log_.Error("recording not closed", {{"error", stopped.error().message}});
+      }
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      if (state_ == State::kClosed) return;
+      SetStateLocked(State::kClosed, "closed");
+    }
+    Changed();
+  }
 
   Result<api::RecorderStatus> GetStatus() override { return Snapshot(); }
 

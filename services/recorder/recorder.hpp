@@ -45,8 +45,9 @@ class Recorder : public api::RecorderApi {
   static Result<std::unique_ptr<Recorder>> Create(ircp::RawBus& bus, const Clock& clock, Log& log,
                                                   StatusDecoder decode_status,
                                                   RecorderOptions options);
-  /// Closes an open file.
   ~Recorder() override = default;
+  /// Closes an open file; every command is refused from then on. The destructor does the same.
+  virtual void Close() = 0;
 };
 
 /// Whether a text can be a file's name: letters, digits, '.', '_', '-', not beginning with a dot.
