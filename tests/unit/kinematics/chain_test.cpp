@@ -6,6 +6,8 @@
 #ifdef EXEMPLAR_WITH_KDL
 #include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainjnttojacsolver.hpp>
+
+#include "support/kdl_peer.hpp"
 #endif
 
 #include "exemplar/kinematics/robot_description.hpp"
@@ -136,37 +138,11 @@ TEST(LinkPoses, AgreesWithTheChain) {
 }
 
 #ifdef EXEMPLAR_WITH_KDL
-KDL::Frame ToKdl(const geometry::Pose& pose) {
-  const Eigen::Vector3d& p = pose.translation;
-  const Eigen::Quaterniond& q = pose.rotation;
-  return {KDL::Rotation::Quaternion(q.x(), q.y(), q.z(), q.w()), KDL::Vector(p.x(), p.y(), p.z())};
-}
-
-/// The same links and joints by KDL's own means.
-KDL::Chain ToKdl(const RobotModel& model, const Chain& chain) {
-  std::vector<int> path;
-  for (int link = model.FindLink(chain.tip_link()); link != model.FindLink(chain.base_link());
-       link = model.joints[path.back()].parent_link) {
-    path.push_back(model.links[link].parent_joint);
-  }
-  KDL::Chain result;
-  for (auto j = path.rbegin(); j != path.rend(); ++j) {
-    const Joint& joint = model.joints[*j];
-    const KDL::Frame frame = ToKdl(joint.parent_T_joint);
-    const KDL::Vector axis = frame.M * KDL::Vector(joint.axis.x(), joint.axis.y(), joint.axis.z());
-    const KDL::Joint::JointType type =
-        joint.type == JointType::kPrismatic ? KDL::Joint::TransAxis : KDL::Joint::RotAxis;
-    result.addSegment(joint.type == JointType::kFixed
-                          ? KDL::Segment(KDL::Joint(KDL::Joint::Fixed), frame)
-                          : KDL::Segment(KDL::Joint(joint.name, frame.p, axis, type), frame));
-  }
-  return result;
-}
-
 TEST(Chain, EqualsKdlInPoseAndJacobian) {
-  std::vector<testing::NamedChain> chains = testing::AllChains();
-  for (const testing::NamedChain& named : chains) {
-    const KDL::Chain peer = ToKdl(named.model, named.chain);
+  for (const testing::NamedChain& named : testing::AllChains()) {
+    const std::optional<KDL::Chain> made = exemplar::testing::ToKdl(named.model, named.chain);
+    ASSERT_TRUE(made) << named.name;
+    const KDL::Chain& peer = *made;
     KDL::ChainFkSolverPos_recursive forward(peer);
     KDL::ChainJntToJacSolver derivative(peer);
     const unsigned n = static_cast<unsigned>(named.chain.dof());

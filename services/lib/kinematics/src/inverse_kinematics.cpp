@@ -70,7 +70,7 @@ class Solver {
       solution.restarts = attempt;
       Evaluate(now_);
       const bool met = Descend(solution.iterations);
-      if (attempt == 0 || now_.squared < best_.squared) std::swap(best_, now_);
+      if (met || attempt == 0 || now_.squared < best_.squared) std::swap(best_, now_);
       if (met) break;
       if (attempt == options_.max_restarts) return NotMet();
       RandomPosture(rng);

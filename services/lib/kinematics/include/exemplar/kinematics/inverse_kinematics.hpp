@@ -20,7 +20,7 @@ struct IkOptions {
   /// What a squared radian (or metre) of each joint off `preferred` costs, positive; empty: 1 each.
   Eigen::VectorXd preferred_weights = {};
   int max_iterations = 100;  ///< of one descent; one that makes no headway ends sooner
-  int max_restarts = 40;     ///< from random postures, after the seed
+  int max_restarts = 100;    ///< from random postures, after the seed
   std::uint64_t random_seed = 1;
 };
 
