@@ -65,6 +65,7 @@ std::vector<std::size_t> FindNews(std::span<const double> times_s,
                                   const Eigen::Ref<const Eigen::MatrixXd>& values) {
   constexpr double kLeastPart = 0.2;
   constexpr double kStillness = 4;
+  constexpr double kLongestHold_s = 0.25;
   assert(static_cast<std::size_t>(values.rows()) == times_s.size());
   const std::size_t n = times_s.size();
   std::vector<std::size_t> news;
@@ -83,12 +84,13 @@ std::vector<std::size_t> FindNews(std::span<const double> times_s,
   for (std::size_t i = 1; i < news.size(); ++i) {
     intervals.push_back(times_s[news[i]] - times_s[news[i - 1]]);
   }
-  const double usual_s = Quantile(std::move(intervals), 0.5);
+  const double longest_s =
+      std::min(kStillness * Quantile(std::move(intervals), 0.5), kLongestHold_s);
   for (std::size_t i = 0; i < news.size(); ++i) {
     kept.push_back(news[i]);
     const std::size_t last = (i + 1 < news.size() ? news[i + 1] : n) - 1;
     const bool end = i + 1 == news.size();
-    if (last > news[i] && (end || times_s[last] - times_s[news[i]] > kStillness * usual_s)) {
+    if (last > news[i] && (end || times_s[last] - times_s[news[i]] > longest_s)) {
       kept.push_back(last);
     }
   }

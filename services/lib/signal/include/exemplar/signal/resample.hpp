@@ -38,8 +38,8 @@ std::vector<Gap> FindGaps(std::span<const double> times_s, double limit_s);
 /// Which samples of a sample-and-hold stream are news. Where a source is recorded faster than it
 /// measures, many samples repeat the one before to the last bit, and the held steps would pass for
 /// noise. Kept are the samples that differ from the one before, and both ends of a stillness: a
-/// value held for more than four times the usual interval between news. All, when less than a fifth
-/// of the samples repeat. Precondition: as many times as rows.
+/// value held for more than four times the usual interval between news, or a quarter of a second.
+/// All, when less than a fifth of the samples repeat. Precondition: as many times as rows.
 std::vector<std::size_t> FindNews(std::span<const double> times_s,
                                   const Eigen::Ref<const Eigen::MatrixXd>& values);
 

@@ -1,0 +1,315 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "exemplar/base/rng.hpp"
+#include "exemplar/learning/aligned.hpp"
+#include "exemplar/learning/warp.hpp"
+#include "exemplar/signal/resample.hpp"
+#include "motions.hpp"
+
+namespace exemplar::learning {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// A demonstration of known episodes: each joint goes from one level to the next by minimum jerk,
+// with a rest between; a spurious twist of the last joint may lie in a rest.
+struct Demonstration {
+  UniformTrial trial;
+  std::vector<double> begins_s;
+};
+
+const std::vector<std::vector<double>>& Levels() {
+  static const std::vector<std::vector<double>> levels = {
+      {0, 0, 0}, {0.9, -0.4, 0.2}, {0.6, 0.5, 0.3}, {0.05, 0.1, 0}};
+  return levels;
+}
+
+Demonstration Demonstrate(Rng& rng, const std::string& id, int spurious) {
+  Demonstration made;
+  struct Move {
+    double begin_s, duration_s;
+    std::vector<double> by;
+  };
+  std::vector<Move> moves;
+  double t = rng.Uniform(0.3, 0.6);
+  const double pace = rng.Uniform(0.8, 1.3);
+  for (std::size_t e = 1; e < Levels().size(); ++e) {
+    Move move{t, pace * rng.Uniform(0.8, 1.2), {}};
+    for (std::size_t j = 0; j < 3; ++j) {
+      move.by.push_back((Levels()[e][j] - Levels()[e - 1][j]) * rng.Uniform(0.95, 1.05));
+    }
+    made.begins_s.push_back(t);
+    t += move.duration_s;
+    moves.push_back(move);
+    const double rest_s = rng.Uniform(0.9, 1.4);
+    if (spurious > 0) {
+      --spurious;
+      moves.push_back({t + 0.25, 0.25, {0, 0, 0.12}});
+      moves.push_back({t + 0.5, 0.25, {0, 0, -0.12}});
+    }
+    t += rest_s;
+  }
+  made.trial = EvenTrial(t, 60);
+  made.trial.id = id;
+  made.trial.joint_names = {"a", "b", "c"};
+  const auto n = static_cast<Eigen::Index>(made.trial.time_s.size());
+  made.trial.joints = Eigen::MatrixXd::Zero(n, 3);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double now = made.trial.time_s[static_cast<std::size_t>(k)];
+    for (const Move& move : moves) {
+      for (Eigen::Index j = 0; j < 3; ++j) {
+        made.trial.joints(k, j) += move.by[static_cast<std::size_t>(j)] *
+                                   MinimumJerk((now - move.begin_s) / move.duration_s);
+      }
+    }
+  }
+  return made;
+}
+
+std::vector<Demonstration> DemonstrateAll(Rng& rng, int n) {
+  std::vector<Demonstration> all;
+  for (int i = 0; i < n; ++i) all.push_back(Demonstrate(rng, "t" + std::to_string(i), i % 3));
+  return all;
+}
+
+std::vector<UniformTrial> TrialsOf(const std::vector<Demonstration>& all) {
+  std::vector<UniformTrial> trials;
+  for (const Demonstration& d : all) trials.push_back(d.trial);
+  return trials;
+}
+
+Alignment Aligned(std::vector<UniformTrial> trials, const LearnOptions& options = {}) {
+  Result<Alignment> result = Align(std::move(trials), options);
+  EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
+  return result.ok() ? std::move(*result) : Alignment{};
+}
+
+// Markers that miss: a marker is the rise through c, somewhat after its motion's begin.
+int CountWrongTrials(const Alignment& aligned, const std::vector<Demonstration>& all) {
+  constexpr double kLatest_s = 0.45;
+  int wrong = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    bool right = true;
+    for (std::size_t e = 0; e < all[i].begins_s.size(); ++e) {
+      const double late = aligned.trials[i].own_knots_s[e + 1] - all[i].begins_s[e];
+      right = right && late > 0 && late < kLatest_s;
+    }
+    wrong += right ? 0 : 1;
+  }
+  return wrong;
+}
+
+// PAPER.md section 9, claim 3, with what the two rules do not share: a vote is also cast for
+// subsets that nobody chooses in the end.
+TEST(Align, FindsTheTrueBoundariesAmongSpuriousOnes) {
+  Rng rng(1);
+  int vote_wrong = 0, joint_wrong = 0;
+  std::size_t candidates = 0, trials = 0;
+  for (int round = 0; round < 25; ++round) {
+    const std::vector<Demonstration> all = DemonstrateAll(rng, 4);
+    LearnOptions options;
+    options.selection = Selection::kVote;
+    const Alignment vote = Aligned(TrialsOf(all), options);
+    options.selection = Selection::kJoint;
+    const Alignment joint = Aligned(TrialsOf(all), options);
+    ASSERT_EQ(vote.knots_s.size(), 5u);  // start, three episodes, end
+    ASSERT_EQ(joint.knots_s.size(), 5u);
+    vote_wrong += CountWrongTrials(vote, all);
+    joint_wrong += CountWrongTrials(joint, all);
+    trials += all.size();
+    for (const AlignedTrial& trial : vote.trials) {
+      for (const Marker& marker : trial.segmentation.markers) {
+        if (marker.kind == MarkerKind::kBeginning) ++candidates;
+      }
+    }
+  }
+  EXPECT_GT(candidates, 3 * trials + 20);  // there were spurious ones to reject
+  EXPECT_LE(vote_wrong, 5);
+  EXPECT_LE(joint_wrong, vote_wrong);
+  RecordProperty("trials", static_cast<int>(trials));
+  RecordProperty("candidates", static_cast<int>(candidates));
+  RecordProperty("vote_wrong", vote_wrong);
+  RecordProperty("joint_wrong", joint_wrong);
+}
+
+// PAPER.md section 9, claim 4; Figs. 4, 8, 9.
+TEST(Align, TheCanonicalMotionKeepsTheTrialsExtremaAndThePlainMeanDoesNot) {
+  Rng rng(2);
+  std::vector<Demonstration> all;
+  // A joint that goes there and back, at times of its own in each trial.
+  for (int i = 0; i < 5; ++i) {
+    Demonstration made;
+    made.trial = EvenTrial(6, 60);
+    made.trial.id = "t" + std::to_string(i);
+    const double begin_s = 0.4 + 0.7 * i;
+    const auto n = static_cast<Eigen::Index>(made.trial.time_s.size());
+    made.trial.joints.resize(n, 1);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double t = made.trial.time_s[static_cast<std::size_t>(k)];
+      made.trial.joints(k, 0) =
+          MinimumJerk((t - begin_s) / 0.9) - MinimumJerk((t - begin_s - 1.0) / 0.9);
+    }
+    all.push_back(made);
+  }
+  const Alignment aligned = Aligned(TrialsOf(all));
+  Eigen::VectorXd plain = Eigen::VectorXd::Zero(all[0].trial.joints.rows());
+  double extremum = 0;
+  for (const Demonstration& d : all) {
+    plain += d.trial.joints.col(0) / 5;
+    extremum += d.trial.joints.maxCoeff() / 5;
+  }
+  EXPECT_GT(aligned.canonical_joints.maxCoeff(), 0.95 * extremum);
+  EXPECT_LT(plain.maxCoeff(), 0.75 * extremum);
+  EXPECT_GT(aligned.mean_correlation, 0.8);
+  EXPECT_LT(aligned.plain_correlation, 0.5);
+}
+
+TEST(Align, MarkersOfAllTrialsFallOnTheirMean) {
+  Rng rng(3);
+  const std::vector<Demonstration> all = DemonstrateAll(rng, 5);
+  const Alignment aligned = Aligned(TrialsOf(all));
+  for (std::size_t k = 0; k < aligned.knots_s.size(); ++k) {
+    double mean = 0;
+    for (const AlignedTrial& trial : aligned.trials) mean += trial.own_knots_s[k] / 5;
+    EXPECT_NEAR(aligned.knots_s[k], mean, 1e-12);
+  }
+  EXPECT_EQ(aligned.time_s.back(), aligned.knots_s.back());
+  for (const AlignedTrial& trial : aligned.trials) {
+    ASSERT_EQ(trial.chosen.size() + 2, trial.own_knots_s.size());
+    for (std::size_t m = 0; m < trial.chosen.size(); ++m) {
+      const Marker& marker = trial.segmentation.markers[static_cast<std::size_t>(trial.chosen[m])];
+      EXPECT_EQ(marker.kind, MarkerKind::kBeginning);
+      EXPECT_NEAR(marker.time_s, trial.own_knots_s[m + 1], 0.04);
+    }
+    // Start on start, end on end.
+    EXPECT_EQ(trial.warped.joints.row(0), trial.own.joints.row(0));
+    EXPECT_LT((trial.warped.joints.bottomRows(1) - trial.own.joints.bottomRows(1)).norm(), 1e-12);
+    EXPECT_EQ(trial.warped.time_s, aligned.time_s);
+  }
+}
+
+TEST(Align, OrderOfTheTrialsDoesNotMatter) {
+  Rng rng(4);
+  const std::vector<Demonstration> all = DemonstrateAll(rng, 4);
+  std::vector<UniformTrial> trials = TrialsOf(all);
+  for (const Selection selection : {Selection::kVote, Selection::kJoint}) {
+    LearnOptions options;
+    options.selection = selection;
+    const Alignment forward = Aligned(trials, options);
+    const Alignment backward = Aligned({trials.rbegin(), trials.rend()}, options);
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      EXPECT_EQ(forward.trials[i].chosen, backward.trials[trials.size() - 1 - i].chosen);
+    }
+  }
+}
+
+TEST(Align, TheJointChoiceReportsAProvenBound) {
+  Rng rng(5);
+  const Alignment aligned = Aligned(TrialsOf(DemonstrateAll(rng, 4)));
+  EXPECT_GT(aligned.choice_value, 0);
+  EXPECT_NEAR(aligned.choice_bound, aligned.choice_value, 1e-8);
+}
+
+TEST(Align, ATrialWithoutMarkersLeavesLinearTimeAndIsNamed) {
+  Rng rng(6);
+  std::vector<UniformTrial> trials = TrialsOf(DemonstrateAll(rng, 3));
+  UniformTrial still = EvenTrial(4, 60);
+  still.id = "still.csv";
+  still.joint_names = trials[0].joint_names;
+  still.joints = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(still.time_s.size()), 3);
+  trials.push_back(still);
+  const Alignment aligned = Aligned(trials);
+  EXPECT_EQ(aligned.knots_s.size(), 2u);
+  EXPECT_THAT(aligned.warnings, ElementsAre(HasSubstr("still.csv")));
+
+  LearnOptions options;
+  options.leave_out = {"still.csv"};
+  const Alignment without = Aligned(trials, options);
+  EXPECT_EQ(without.trials.size(), 3u);
+  EXPECT_EQ(without.knots_s.size(), 5u);
+  EXPECT_THAT(without.warnings, IsEmpty());
+}
+
+TEST(Align, ATrialThatAloneDragsTheNumberOfMarkersDownIsNamed) {
+  Rng rng(7);
+  std::vector<UniformTrial> trials = TrialsOf(DemonstrateAll(rng, 3));
+  UniformTrial& cut = trials[1];
+  const auto half = static_cast<Eigen::Index>(cut.time_s.size() * 2 / 5);
+  cut.time_s.resize(static_cast<std::size_t>(half));
+  cut.joints.conservativeResize(half, Eigen::NoChange);
+  EXPECT_THAT(Aligned(trials).warnings, Contains(HasSubstr("trial t1 has ")));
+}
+
+TEST(Align, OneTrialIsItsOwnCanonicalMotion) {
+  Rng rng(8);
+  const Demonstration one = Demonstrate(rng, "one", 1);
+  const Alignment aligned = Aligned({one.trial});
+  EXPECT_LT((aligned.canonical_joints - one.trial.joints).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_EQ(aligned.mean_correlation, 1);
+}
+
+TEST(Align, TheNumberOfFramesCanBeAsked) {
+  Rng rng(9);
+  LearnOptions options;
+  options.frames = 50;
+  EXPECT_EQ(Aligned(TrialsOf(DemonstrateAll(rng, 3)), options).canonical_joints.rows(), 50);
+}
+
+TEST(Align, StopsWhenAskedAndRefusesNoTrials) {
+  Rng rng(10);
+  std::stop_source stop;
+  stop.request_stop();
+  const Result<Alignment> stopped =
+      Align(TrialsOf(DemonstrateAll(rng, 3)), {}, {}, stop.get_token());
+  ASSERT_FALSE(stopped.ok());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+  const Result<Alignment> none = Align({}, {});
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(WarpTrial, OneWarpServesAllStreams) {
+  Rng rng(11);
+  UniformTrial trial = EvenTrial(3, 60);
+  const auto n = static_cast<Eigen::Index>(trial.time_s.size());
+  trial.joints.resize(n, 1);
+  trial.touch_n.resize(n);
+  trial.base_T_object.resize(2);
+  trial.object_names = {"moving", "still"};
+  const geometry::Pose place{{0.1, 0.2, 0.3}, geometry::ExpSo3({0.3, 0.1, 0.2})};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double t = trial.time_s[static_cast<std::size_t>(k)];
+    trial.joints(k, 0) = t;
+    trial.touch_n[k] = t;
+    trial.hand_open.push_back(t);
+    trial.base_T_tool.push_back({{t, 0, 0}, geometry::ExpSo3({0, 0, t})});
+    trial.base_T_object[0].push_back(geometry::Pose::FromTranslation({0, t, 0}));
+    trial.base_T_object[1].push_back(place);
+  }
+  const std::vector<double> common = signal::EvenTimes(0, 4, 200);
+  const UniformTrial warped =
+      WarpTrial(trial, std::vector<double>{0, 1, 3}, std::vector<double>{0, 2.5, 4}, common);
+  for (std::size_t k = 0; k < common.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    const double own = warped.joints(row, 0);
+    EXPECT_NEAR(warped.touch_n[row], own, 1e-12);
+    EXPECT_NEAR(warped.hand_open[k], own, 1e-12);
+    EXPECT_NEAR(warped.base_T_tool[k].translation.x(), own, 1e-12);
+    EXPECT_NEAR(geometry::LogSo3(warped.base_T_tool[k].rotation).z(), own, 1e-9);
+    EXPECT_NEAR(warped.base_T_object[0][k].translation.y(), own, 1e-12);
+    EXPECT_EQ(warped.base_T_object[1][k].rotation.coeffs(), place.rotation.coeffs());
+    if (k > 0) {
+      EXPECT_GE(own, warped.joints(row - 1, 0));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace exemplar::learning
