@@ -1,10 +1,31 @@
 #include "exemplar/perception/picture.hpp"
 
+#include <algorithm>
+#include <initializer_list>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
 namespace exemplar::perception {
+namespace {
+
+/// JPEG or PNG by its first bytes, and not cut off by its last: the decoders would fill the rest of
+/// a cut picture with grey.
+bool EndsAsItBegan(std::span<const std::uint8_t> bytes) {
+  const auto begins = [&](std::initializer_list<std::uint8_t> with) {
+    return bytes.size() >= with.size() && std::equal(with.begin(), with.end(), bytes.begin());
+  };
+  const auto ends = [&](std::initializer_list<std::uint8_t> with) {
+    return bytes.size() >= with.size() &&
+           std::equal(with.begin(), with.end(),
+                      bytes.end() - static_cast<std::ptrdiff_t>(with.size()));
+  };
+  if (begins({0xFF, 0xD8})) return ends({0xFF, 0xD9});
+  if (begins({0x89, 'P', 'N', 'G'})) return ends({'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82});
+  return false;
+}
+
+}  // namespace
 
 Result<std::vector<std::uint8_t>> Encode(const Picture& picture, std::string_view encoding,
                                          int quality) {
@@ -34,6 +55,9 @@ Result<std::vector<std::uint8_t>> Encode(const Picture& picture, std::string_vie
 Result<Picture> Decode(std::span<const std::uint8_t> bytes) {
   const std::string size = std::to_string(bytes.size()) + " bytes";
   if (bytes.empty()) return InvalidArgument("picture: " + size);
+  if (!EndsAsItBegan(bytes)) {
+    return InvalidArgument("picture of " + size + " is neither a whole JPEG nor a whole PNG");
+  }
   cv::Mat bgr;
   try {
     const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
@@ -42,7 +66,7 @@ Result<Picture> Decode(std::span<const std::uint8_t> bytes) {
   } catch (const cv::Exception& e) {
     return InvalidArgument("picture of " + size + ": " + e.err);
   }
-  if (bgr.empty()) return InvalidArgument("picture of " + size + " is neither JPEG nor PNG");
+  if (bgr.empty()) return InvalidArgument("picture of " + size + " cannot be decoded");
   Picture picture{bgr.cols, bgr.rows, {}};
   picture.rgb.resize(3 * bgr.total());
   cv::Mat rgb(bgr.rows, bgr.cols, CV_8UC3, picture.rgb.data());

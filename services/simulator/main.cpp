@@ -1,0 +1,55 @@
+// exemplar-simulator: a robot, a table and buttons in MuJoCo, on the network like the real ones.
+
+#include "exemplar/bus/participant.hpp"
+#include "exemplar/program/options.hpp"
+#include "exemplar/program/runtime.hpp"
+#include "simulator/session.hpp"
+
+int main(int argc, char** argv) {
+  using namespace exemplar;
+  constexpr const char* kName = "exemplar-simulator";
+  std::string robot_folder;
+  std::string scene_file;
+  std::string follow = "command";
+  std::string cameras = "on";
+  simulator::SessionOptions settings;
+  double step_ms = 1;
+
+  program::Options options(
+      kName, "Simulates a robot and what stands around it (MuJoCo); talks DDS as a real one would",
+      "exemplar-simulator --robot deploy/models/leonardo --scene deploy/config/press_table.yaml",
+      {.bus = true});
+  options.Add("--robot", robot_folder, "folder with robot.yaml and the URDF").Required();
+  options.Add("--scene", scene_file, "file that says what stands around the robot").Required();
+  options.Add("--follow", follow, "whom the robot follows: ircp/joint_command or ircp/suit")
+      .OneOf({"command", "suit"});
+  options.Add("--cameras", cameras, "whether the scene's cameras send pictures")
+      .OneOf({"on", "off"});
+  options.Add("--rate-hz", settings.rate_hz, "of ircp/joint_state").MinMax(1, 1000);
+  options.Add("--step-ms", step_ms, "of the simulation").MinMax(0.1, 5);
+  options.Add("--picture-encoding", settings.picture_encoding, "how pictures are sent")
+      .OneOf({"jpeg", "png"});
+  if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
+
+  program::Signals signals;
+  const std::unique_ptr<Log> log = program::MakeLog(options.common(), "simulator");
+  const SystemClock clock;
+  settings.leader = follow == "suit" ? simulator::Leader::kSuit : simulator::Leader::kCommand;
+  settings.cameras = cameras == "on";
+  settings.world.step = FromSeconds(1e-3 * step_ms);
+
+  const auto robot = kinematics::ReadRobotDescription(robot_folder);
+  if (!robot) return program::Fail(kName, robot.error());
+  const auto scene = scene::ReadDescription(scene_file);
+  if (!scene) return program::Fail(kName, scene.error());
+  auto participant = bus::Participant::Create({.domain = options.common().domain,
+                                               .station = options.common().station,
+                                               .name = kName,
+                                               .clock = &clock,
+                                               .log = log.get()});
+  if (!participant) return program::Fail(kName, participant.error());
+  auto session = simulator::Session::Create(**participant, clock, *log, *robot, *scene, settings);
+  if (!session) return program::Fail(kName, session.error());
+  (*session)->Run(signals.token());
+  return 0;
+}
