@@ -103,14 +103,20 @@ Status CheckOptions(const ParticipantOptions& options) {
   return {};
 }
 
-Result<rtps::LocatorList_t> InitialPeers(const std::vector<std::string>& peers) {
+Result<rtps::LocatorList_t> InitialPeers(int domain, const std::vector<std::string>& peers) {
   rtps::LocatorList_t list;
-  std::vector<std::string> addresses = {"239.255.0.1", "127.0.0.1"};
+  // With port 0, Fast DDS 2.9 would try the group at the unicast ports only.
+  Locator_t group;
+  IPLocator::createLocator(
+      LOCATOR_KIND_UDPv4, "239.255.0.1",
+      rtps::PortParameters().getMulticastPort(static_cast<std::uint32_t>(domain)), group);
+  list.push_back(group);
+  std::vector<std::string> addresses = {"127.0.0.1"};
   addresses.insert(addresses.end(), peers.begin(), peers.end());
   for (const std::string& address : addresses) {
     Locator_t locator;
     locator.kind = LOCATOR_KIND_UDPv4;
-    locator.port = 0;  // Fast DDS fills in the domain's ports
+    locator.port = 0;  // Fast DDS fills in the ports of the first kUnicastPeers participants
     if (!IPLocator::setIPv4(locator, address)) {
       return InvalidArgument("peer \"" + address + "\" is not an IPv4 address", "peers");
     }
@@ -171,7 +177,7 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
   if (Status checked = CheckOptions(options); !checked.ok()) return checked.error();
   Result<std::vector<std::string>> interfaces = ResolveInterfaces(options.interfaces);
   if (!interfaces.ok()) return interfaces.error();
-  Result<rtps::LocatorList_t> peers = InitialPeers(options.peers);
+  Result<rtps::LocatorList_t> peers = InitialPeers(options.domain, options.peers);
   if (!peers.ok()) return peers.error();
 
   // Within one process, too, samples take the network's way: otherwise callbacks would run on the
