@@ -57,7 +57,10 @@ std::string ReportText(const learning::SkillReport& report) {
   }
   text += trials.Text(2);
   for (const auto& trial : report.trials) {
-    for (const std::string& note : trial.notes) text += "  " + trial.source + ": " + note + '\n';
+    for (const std::string& note : trial.notes) {
+      const bool named = note.compare(0, trial.source.size(), trial.source) == 0;
+      text += "  " + (named ? "" : trial.source + ": ") + note + '\n';
+    }
   }
 
   if (!report.methods.empty()) {

@@ -126,13 +126,23 @@ class SkillService final : public v1::SkillService::Service {
   }
 
  private:
+  /// Fields as the request has them: the interface's arguments lie in two of its messages.
+  static Error WithRequestField(Error error) {
+    if (error.field == "name" || error.field == "version") {
+      error.field.insert(0, "skill.");
+    } else if (!error.field.empty()) {
+      error.field.insert(0, "query.");
+    }
+    return error;
+  }
+
   Status Answer(const v1::SkillVersion& skill, const v1::SkillQuery& message,
                 v1::SkillMotion* answer) {
     const Result<demonstration::SkillQuery> query = FromProto(message, "query");
     if (!query) return query.error();
     const Result<demonstration::SkillMotion> motion =
         skills_.Query(skill.name(), skill.version(), *query);
-    if (!motion) return motion.error();
+    if (!motion) return WithRequestField(motion.error());
     ToProto(*motion, answer);
     return {};
   }

@@ -24,10 +24,10 @@ struct Services {
 
 /// One finished call, for logs and metrics.
 struct CallRecord {
-  std::string_view method;      ///< "exemplar.v1.SkillService/Query"
-  std::string_view request_id;  ///< the caller's `x-request-id`, else one made here
-  std::string_view peer;        ///< "ipv4:127.0.0.1:40312"
-  Status status;
+  std::string_view method = {};      ///< "exemplar.v1.SkillService/Query"
+  std::string_view request_id = {};  ///< the caller's `x-request-id`, else one made here
+  std::string_view peer = {};        ///< "ipv4:127.0.0.1:40312"
+  Status status = {};
   Duration duration{0};
 };
 
