@@ -1,0 +1,108 @@
+#include <algorithm>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <utility>
+
+#include "exemplar/base/ids.hpp"
+#include "exemplar/ircp/control.hpp"
+
+namespace exemplar::ircp {
+namespace {
+
+constexpr Duration kRepeatPeriod = std::chrono::seconds(1);
+
+class Client final : public ControlClient {
+ public:
+  Client(const Clock& clock, std::string program, std::uint64_t seed)
+      : clock_(clock), program_(std::move(program)), rng_(seed) {}
+
+  ~Client() override { reader_.reset(); }
+
+  Status Start(Bus& bus, const std::string& source) {
+    auto writer = bus.MakeWriterOn<CommandSample>(CommandTopic(program_), source);
+    if (!writer) return writer.error();
+    writer_ = std::move(*writer);
+    auto reader = bus.MakeReaderOn<StatusSample>(
+        StatusTopic(program_),
+        [this](const StatusSample& status, const Reception&) { Take(status); });
+    if (!reader) return reader.error();
+    reader_ = std::move(*reader);
+    return {};
+  }
+
+  Result<Answer> Call(const std::string& action, std::map<std::string, std::string> arguments,
+                      Duration timeout) override {
+    Pending pending;
+    CommandSample command;
+    command.program = program_;
+    command.action = action;
+    command.arguments = std::move(arguments);
+    command.validity = timeout;
+    {
+      const std::lock_guard lock(mutex_);
+      command.request_id = MakeId("request", rng_);
+      pending_[command.request_id] = &pending;
+    }
+    const Result<Answer> answer = Ask(command, pending, clock_.Steady() + timeout);
+    const std::lock_guard lock(mutex_);
+    pending_.erase(command.request_id);
+    return answer;
+  }
+
+ private:
+  struct Pending {
+    std::optional<Answer> answer;
+    std::stop_source answered;
+  };
+
+  Result<Answer> Ask(const CommandSample& command, const Pending& pending, Duration deadline) {
+    while (true) {
+      if (Status sent = writer_->Write(command); !sent) return sent.error();
+      const Duration next = std::min(deadline, clock_.Steady() + kRepeatPeriod);
+      clock_.SleepUntil(next, pending.answered.get_token());
+      {
+        const std::lock_guard lock(mutex_);
+        if (pending.answer) {
+          if (pending.answer->ok) return *pending.answer;
+          return FailedPrecondition(pending.answer->detail);
+        }
+      }
+      if (clock_.Steady() >= deadline) {
+        return Unavailable(program_ + " did not answer \"" + command.action + "\" on " +
+                           StatusTopic(program_) + " in time");
+      }
+    }
+  }
+
+  /// On a thread of the network.
+  void Take(const StatusSample& status) {
+    if (status.request_id.empty()) return;
+    const std::lock_guard lock(mutex_);
+    const auto found = pending_.find(status.request_id);
+    if (found == pending_.end() || found->second->answer) return;
+    found->second->answer = Answer{status.ok, status.detail, status.values};
+    found->second->answered.request_stop();
+  }
+
+  const Clock& clock_;
+  const std::string program_;
+  std::mutex mutex_;
+  Rng rng_;
+  std::map<std::string, Pending*> pending_;
+  std::unique_ptr<Writer<CommandSample>> writer_;
+  std::unique_ptr<Reader> reader_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ControlClient>> ControlClient::Create(Bus& bus, const Clock& clock,
+                                                             std::string program,
+                                                             std::string source,
+                                                             std::uint64_t seed) {
+  auto client = std::make_unique<Client>(clock, std::move(program), seed);
+  if (Status started = client->Start(bus, source); !started) return started.error();
+  return std::unique_ptr<ControlClient>(std::move(client));
+}
+
+}  // namespace exemplar::ircp

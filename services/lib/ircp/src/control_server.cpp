@@ -1,0 +1,182 @@
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "exemplar/ircp/control.hpp"
+
+namespace exemplar::ircp {
+namespace {
+
+constexpr std::size_t kAnswersKept = 256;
+constexpr std::size_t kLongestQueue = 64;
+constexpr Duration kStatusPeriod = std::chrono::seconds(1);
+
+struct Received {
+  CommandSample command;
+  Duration at{0};
+};
+
+class Server final : public ControlServer {
+ public:
+  Server(const Clock& clock, std::string program, Handler handler)
+      : clock_(clock), program_(std::move(program)), handler_(std::move(handler)) {}
+
+  ~Server() override {
+    reader_.reset();  // no command comes any more
+    heartbeat_ = {};
+    worker_ = {};
+  }
+
+  Status Start(Bus& bus) {
+    auto writer = bus.MakeWriterOn<StatusSample>(StatusTopic(program_), program_);
+    if (!writer) return writer.error();
+    writer_ = std::move(*writer);
+    auto reader = bus.MakeReaderOn<CommandSample>(
+        CommandTopic(program_),
+        [this](const CommandSample& command, const Reception&) { Take(command); });
+    if (!reader) return reader.error();
+    reader_ = std::move(*reader);
+    worker_ = std::jthread([this](const std::stop_token& stop) { Work(stop); });
+    heartbeat_ = std::jthread([this](const std::stop_token& stop) {
+      do {
+        Publish({}, {});
+      } while (clock_.SleepFor(kStatusPeriod, stop));
+    });
+    return {};
+  }
+
+  void SetState(std::string state, std::string detail) override {
+    {
+      const std::lock_guard lock(mutex_);
+      state_ = std::move(state);
+      detail_ = std::move(detail);
+    }
+    Publish({}, {});
+  }
+
+  void SetSentCounts(std::function<std::vector<TopicCount>()> counts) override {
+    const std::lock_guard lock(mutex_);
+    counts_ = std::move(counts);
+  }
+
+  void SetValues(std::function<std::map<std::string, std::string>()> values) override {
+    const std::lock_guard lock(mutex_);
+    values_ = std::move(values);
+  }
+
+ private:
+  /// On a thread of the network.
+  void Take(const CommandSample& command) {
+    if (command.program != program_) return;
+    std::optional<Answer> again;
+    {
+      const std::lock_guard lock(mutex_);
+      if (const auto known = answers_.find(command.request_id); known != answers_.end()) {
+        again = known->second;
+      } else if (!waiting_.insert(command.request_id).second) {
+        return;
+      } else if (queue_.size() >= kLongestQueue) {
+        waiting_.erase(command.request_id);
+        again = Answer{false, program_ + " has too many commands waiting", {}};
+      } else {
+        queue_.push_back({command, clock_.Steady()});
+      }
+    }
+    if (again) {
+      Publish(command.request_id, *again);
+    } else {
+      arrived_.notify_one();
+    }
+  }
+
+  void Work(const std::stop_token& stop) {
+    while (true) {
+      std::unique_lock lock(mutex_);
+      if (!arrived_.wait(lock, stop, [this] { return !queue_.empty(); })) return;
+      const Received next = std::move(queue_.front());
+      queue_.pop_front();
+      lock.unlock();
+
+      const Answer answer = Handle(next);
+
+      lock.lock();
+      waiting_.erase(next.command.request_id);
+      answers_[next.command.request_id] = answer;
+      answered_order_.push_back(next.command.request_id);
+      if (answered_order_.size() > kAnswersKept) {
+        answers_.erase(answered_order_.front());
+        answered_order_.pop_front();
+      }
+      lock.unlock();
+      Publish(next.command.request_id, answer);
+    }
+  }
+
+  Answer Handle(const Received& received) {
+    const Duration validity = received.command.validity;
+    if (validity > Duration::zero() && clock_.Steady() - received.at > validity) {
+      return {false, "\"" + received.command.action + "\" waited longer than it was valid", {}};
+    }
+    return handler_(received.command);
+  }
+
+  void Publish(const std::string& request_id, const std::optional<Answer>& answer) {
+    StatusSample status;
+    std::function<std::vector<TopicCount>()> counts;
+    std::function<std::map<std::string, std::string>()> values;
+    {
+      const std::lock_guard lock(mutex_);
+      status.program = program_;
+      status.state = state_;
+      status.detail = detail_;
+      counts = counts_;
+      values = values_;
+    }
+    // Asked without our lock: they may take locks of their own.
+    if (counts) status.sent = counts();
+    if (values) status.values = values();
+    if (answer) {
+      status.request_id = request_id;
+      status.ok = answer->ok;
+      status.detail = answer->detail;
+      for (const auto& [name, value] : answer->values) status.values[name] = value;
+    }
+    // A status that cannot be written is followed by the next one within a second.
+    (void)writer_->Write(std::move(status));
+  }
+
+  const Clock& clock_;
+  const std::string program_;
+  const Handler handler_;
+
+  std::mutex mutex_;
+  std::condition_variable_any arrived_;
+  std::deque<Received> queue_;
+  std::set<std::string> waiting_;  ///< request ids in the queue or being done
+  std::map<std::string, Answer> answers_;
+  std::deque<std::string> answered_order_;
+  std::string state_;
+  std::string detail_;
+  std::function<std::vector<TopicCount>()> counts_;
+  std::function<std::map<std::string, std::string>()> values_;
+
+  std::unique_ptr<Writer<StatusSample>> writer_;
+  std::unique_ptr<Reader> reader_;
+  std::jthread worker_;
+  std::jthread heartbeat_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ControlServer>> ControlServer::Create(Bus& bus, const Clock& clock,
+                                                             std::string program, Handler handler) {
+  auto server = std::make_unique<Server>(clock, std::move(program), std::move(handler));
+  if (Status started = server->Start(bus); !started) return started.error();
+  return std::unique_ptr<ControlServer>(std::move(server));
+}
+
+}  // namespace exemplar::ircp
