@@ -89,5 +89,30 @@ TEST_F(FileTest, EndsAtAWholeWriteWhenThereIsNoMoreRoom) {
   EXPECT_EQ(Slurp(path).size(), 6000u);
 }
 
+TEST_F(FileTest, WritesTheSameFileWithIndexesOnDiskAsInMemory) {
+  // A chunk a message: about 100 kB of indexes, more than the writer keeps in memory.
+  const auto write = [](std::unique_ptr<ByteScratch> scratch) {
+    MemorySink sink;
+    Result<std::unique_ptr<Writer>> writer =
+        Writer::Create(sink, {.chunk_bytes = 1}, std::move(scratch));
+    EXPECT_TRUE(writer.ok());
+    EXPECT_TRUE((*writer)->AddChannel({1, 0, "t", "cdr", {}}).ok());
+    for (std::uint32_t i = 0; i < 1200; ++i) {
+      EXPECT_TRUE((*writer)->Write(Message{1, i, {}, {}, {1, 2, 3}}).ok());
+    }
+    EXPECT_TRUE((*writer)->Close().ok());
+    return sink.bytes();
+  };
+  Result<std::unique_ptr<FileScratch>> scratch = FileScratch::Create(folder_);
+  ASSERT_TRUE(scratch.ok()) << scratch.error().message;
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+  const Bytes on_disk = write(std::move(*scratch));
+  EXPECT_EQ(on_disk, write(nullptr));
+  MemorySource source(on_disk);
+  const Result<std::unique_ptr<IndexedReader>> reader = IndexedReader::Open(source);
+  ASSERT_TRUE(reader.ok()) << reader.error().message;
+  EXPECT_EQ((*reader)->chunks().size(), 1200u);
+}
+
 }  // namespace
 }  // namespace exemplar::recording

@@ -21,4 +21,8 @@ Result<std::size_t> MemorySource::Read(std::uint64_t offset, std::span<std::uint
   return count;
 }
 
+Result<std::size_t> MemoryScratch::Read(std::uint64_t offset, std::span<std::uint8_t> out) {
+  return MemorySource(sink_.bytes()).Read(offset, out);
+}
+
 }  // namespace exemplar::recording

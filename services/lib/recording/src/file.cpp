@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 
 namespace exemplar::recording {
@@ -51,6 +52,40 @@ Status SyncFolder(const std::filesystem::path& file) {
   return {};
 }
 
+/// All of `bytes` at the file's end, or nothing; `size` is the file's size.
+Status Append(int descriptor, ByteView bytes, const std::filesystem::path& path,
+              std::uint64_t& size) {
+  std::size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t count = ::write(descriptor, bytes.data() + written, bytes.size() - written);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int number = count < 0 ? errno : ENOSPC;
+      const bool undone = ::ftruncate(descriptor, static_cast<off_t>(size)) == 0 &&
+                          ::lseek(descriptor, static_cast<off_t>(size), SEEK_SET) >= 0;
+      return FromErrno(number, path,
+                       undone ? "cannot be written" : "cannot be written, and ends in a cut write");
+    }
+    written += static_cast<std::size_t>(count);
+  }
+  size += written;
+  return {};
+}
+
+Result<std::size_t> ReadAt(int descriptor, std::uint64_t offset, std::span<std::uint8_t> out,
+                           const std::filesystem::path& path) {
+  std::size_t read = 0;
+  while (read < out.size()) {
+    const ssize_t count = ::pread(descriptor, out.data() + read, out.size() - read,
+                                  static_cast<off_t>(offset + read));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return FromErrno(errno, path, "cannot be read");
+    if (count == 0) break;
+    read += static_cast<std::size_t>(count);
+  }
+  return read;
+}
+
 }  // namespace
 
 FileSink::FileSink(int descriptor, std::filesystem::path path)
@@ -66,23 +101,7 @@ Result<std::unique_ptr<FileSink>> FileSink::Create(const std::filesystem::path& 
   return sink;
 }
 
-Status FileSink::Write(ByteView bytes) {
-  std::size_t written = 0;
-  while (written < bytes.size()) {
-    const ssize_t count = ::write(descriptor_, bytes.data() + written, bytes.size() - written);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      const int number = count < 0 ? errno : ENOSPC;
-      const bool undone = ::ftruncate(descriptor_, static_cast<off_t>(size_)) == 0 &&
-                          ::lseek(descriptor_, static_cast<off_t>(size_), SEEK_SET) >= 0;
-      return FromErrno(number, path_,
-                       undone ? "cannot be written" : "cannot be written, and ends in a cut write");
-    }
-    written += static_cast<std::size_t>(count);
-  }
-  size_ += written;
-  return {};
-}
+Status FileSink::Write(ByteView bytes) { return Append(descriptor_, bytes, path_, size_); }
 
 Status FileSink::Sync() {
   if (::fdatasync(descriptor_) != 0) return FromErrno(errno, path_, "cannot be synced");
@@ -107,16 +126,26 @@ Result<std::unique_ptr<FileSource>> FileSource::Open(const std::filesystem::path
 }
 
 Result<std::size_t> FileSource::Read(std::uint64_t offset, std::span<std::uint8_t> out) {
-  std::size_t read = 0;
-  while (read < out.size()) {
-    const ssize_t count = ::pread(descriptor_, out.data() + read, out.size() - read,
-                                  static_cast<off_t>(offset + read));
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return FromErrno(errno, path_, "cannot be read");
-    if (count == 0) break;
-    read += static_cast<std::size_t>(count);
-  }
-  return read;
+  return ReadAt(descriptor_, offset, out, path_);
+}
+
+FileScratch::FileScratch(int descriptor, std::filesystem::path folder)
+    : descriptor_(descriptor), folder_(std::move(folder)) {}
+
+FileScratch::~FileScratch() { ::close(descriptor_); }
+
+Result<std::unique_ptr<FileScratch>> FileScratch::Create(const std::filesystem::path& folder) {
+  std::string name = (folder / ".exemplar-scratch-XXXXXX").string();
+  const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor < 0) return FromErrno(errno, folder, "no scratch file can be made there");
+  ::unlink(name.c_str());
+  return std::unique_ptr<FileScratch>(new FileScratch(descriptor, folder));
+}
+
+Status FileScratch::Write(ByteView bytes) { return Append(descriptor_, bytes, folder_, size_); }
+
+Result<std::size_t> FileScratch::Read(std::uint64_t offset, std::span<std::uint8_t> out) {
+  return ReadAt(descriptor_, offset, out, folder_);
 }
 
 }  // namespace exemplar::recording

@@ -481,6 +481,7 @@ Result<Chunk> DecodeCutChunk(ByteView content) {
 }
 
 std::uint32_t Crc32(std::uint32_t crc, ByteView bytes) {
+  if (bytes.empty()) return crc;  // zlib begins anew when the pointer is null
   return static_cast<std::uint32_t>(crc32_z(crc, bytes.data(), bytes.size()));
 }
 

@@ -1,13 +1,19 @@
 #include "exemplar/recording/writer.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <span>
 
 #include "compression.hpp"
 #include "record_codec.hpp"
 
 namespace exemplar::recording {
 namespace {
+
+/// Chunk indexes are moved to and from the scratch by so many bytes.
+constexpr std::size_t kBlock = 64 * 1024;
 
 /// Strings, maps and schema texts stand behind 32-bit lengths.
 constexpr std::uint64_t kLongestField = std::numeric_limits<std::uint32_t>::max();
@@ -26,7 +32,8 @@ Status CheckLength(std::uint64_t size, const std::string& field) {
 
 class McapWriter final : public Writer {
  public:
-  McapWriter(ByteSink& sink, WriterOptions options) : sink_(sink), options_(std::move(options)) {}
+  McapWriter(ByteSink& sink, WriterOptions options, std::unique_ptr<ByteScratch> scratch)
+      : sink_(sink), options_(std::move(options)), index_scratch_(std::move(scratch)) {}
 
   Status Begin() {
     scratch_.assign(std::begin(kMagic), std::end(kMagic));
@@ -231,61 +238,92 @@ class McapWriter final : public Writer {
     }
     index.message_index_length = scratch_.size() - index.chunk_length;
     if (const Status put = Put(scratch_); !put.ok()) return put;
-    if (options_.chunk_indexes) Encode(index, chunk_index_records_);
+    if (options_.chunk_indexes) {
+      Encode(index, chunk_index_records_);
+      if (chunk_index_records_.size() >= kBlock) {
+        if (const Status spilled = SpillIndexes(); !spilled.ok()) return spilled;
+      }
+    }
     ++statistics_.chunk_count;
     chunk_records_.clear();
     chunk_message_count_ = 0;
     return {};
   }
 
+  Status SpillIndexes() {
+    Status spilled = index_scratch_->Write(chunk_index_records_);
+    if (!spilled.ok()) failed_ = spilled.error();
+    chunk_index_records_.clear();
+    return spilled;
+  }
+
   Status PutSummary() {
     data_ended_ = true;
     const std::uint64_t start = bytes_written_;
-    Bytes summary;
     std::vector<SummaryOffset> groups;
-    const auto group = [&](Opcode opcode, const auto& encode) {
-      const std::size_t before = summary.size();
-      encode();
-      if (summary.size() > before) {
-        groups.push_back(
-            {static_cast<std::uint8_t>(opcode), start + before, summary.size() - before});
-      }
+    std::uint32_t crc = 0;
+    const auto put = [&](ByteView bytes) {
+      if (options_.summary_crc) crc = Crc32(crc, bytes);
+      return Put(bytes);
     };
-    group(Opcode::kSchema, [&] {
-      if (!options_.repeated_schemas) return;
-      for (const auto& [id, schema] : schemas_) Encode(schema, summary);
-    });
-    group(Opcode::kChannel, [&] {
-      if (!options_.repeated_channels) return;
-      for (const auto& [id, channel] : channels_) Encode(channel, summary);
-    });
-    group(Opcode::kStatistics, [&] {
-      if (options_.statistics) Encode(statistics_, summary);
-    });
-    group(Opcode::kChunkIndex, [&] {
-      summary.insert(summary.end(), chunk_index_records_.begin(), chunk_index_records_.end());
-    });
-    group(Opcode::kAttachmentIndex, [&] {
-      for (const AttachmentIndex& index : attachment_indexes_) Encode(index, summary);
-    });
-    group(Opcode::kMetadataIndex, [&] {
-      for (const MetadataIndex& index : metadata_indexes_) Encode(index, summary);
-    });
+    /// `write` puts the records of one kind.
+    const auto group = [&](Opcode opcode, const auto& write) -> Status {
+      const std::uint64_t before = bytes_written_;
+      if (const Status written = write(); !written.ok()) return written;
+      if (bytes_written_ > before) {
+        groups.push_back({static_cast<std::uint8_t>(opcode), before, bytes_written_ - before});
+      }
+      return {};
+    };
+    const auto all = [&](bool wanted, const auto& records, const auto& record_of) {
+      scratch_.clear();
+      if (wanted) {
+        for (const auto& record : records) Encode(record_of(record), scratch_);
+      }
+      return put(scratch_);
+    };
+    const auto second = [](const auto& entry) -> const auto& { return entry.second; };
+    const auto itself = [](const auto& record) -> const auto& { return record; };
+    const std::pair<Opcode, std::function<Status()>> sections[] = {
+        {Opcode::kSchema, [&] { return all(options_.repeated_schemas, schemas_, second); }},
+        {Opcode::kChannel, [&] { return all(options_.repeated_channels, channels_, second); }},
+        {Opcode::kStatistics,
+         [&] { return all(options_.statistics, std::span(&statistics_, 1), itself); }},
+        {Opcode::kChunkIndex, [&] { return PutChunkIndexes(put); }},
+        {Opcode::kAttachmentIndex, [&] { return all(true, attachment_indexes_, itself); }},
+        {Opcode::kMetadataIndex, [&] { return all(true, metadata_indexes_, itself); }}};
+    for (const auto& [opcode, write] : sections) {
+      if (const Status written = group(opcode, write); !written.ok()) return written;
+    }
     Footer footer;
     if (!groups.empty()) footer.summary_start = start;
     if (options_.summary_offsets && !groups.empty()) {
-      footer.summary_offset_start = start + summary.size();
-      for (const SummaryOffset& offset : groups) Encode(offset, summary);
+      footer.summary_offset_start = bytes_written_;
+      if (const Status written = all(true, groups, itself); !written.ok()) return written;
     }
     // The CRC covers the footer up to the CRC itself.
-    Encode(footer, summary);
+    scratch_.clear();
+    Encode(footer, scratch_);
     if (options_.summary_crc) {
-      footer.summary_crc = Crc32(0, ByteView(summary).first(summary.size() - 4));
-      summary.resize(summary.size() - kFooterSize);
-      Encode(footer, summary);
+      footer.summary_crc = Crc32(crc, ByteView(scratch_).first(scratch_.size() - 4));
+      scratch_.clear();
+      Encode(footer, scratch_);
     }
-    summary.insert(summary.end(), std::begin(kMagic), std::end(kMagic));
-    return Put(summary);
+    scratch_.insert(scratch_.end(), std::begin(kMagic), std::end(kMagic));
+    return Put(scratch_);
+  }
+
+  Status PutChunkIndexes(const std::function<Status(ByteView)>& put) {
+    Bytes block(static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, index_scratch_->size())));
+    for (std::uint64_t offset = 0; offset < index_scratch_->size(); offset += block.size()) {
+      Result<std::size_t> read = index_scratch_->Read(offset, block);
+      if (!read.ok()) {
+        failed_ = read.error();
+        return read.error();
+      }
+      if (const Status written = put(ByteView(block).first(*read)); !written.ok()) return written;
+    }
+    return put(chunk_index_records_);
   }
 
   ByteSink& sink_;
@@ -298,7 +336,8 @@ class McapWriter final : public Writer {
   Statistics statistics_;
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, Channel> channels_;
-  Bytes chunk_index_records_;
+  Bytes chunk_index_records_;  ///< behind those in the scratch
+  std::unique_ptr<ByteScratch> index_scratch_;
   std::vector<AttachmentIndex> attachment_indexes_;
   std::vector<MetadataIndex> metadata_indexes_;
 
@@ -313,7 +352,8 @@ class McapWriter final : public Writer {
 
 }  // namespace
 
-Result<std::unique_ptr<Writer>> Writer::Create(ByteSink& sink, WriterOptions options) {
+Result<std::unique_ptr<Writer>> Writer::Create(ByteSink& sink, WriterOptions options,
+                                               std::unique_ptr<ByteScratch> scratch) {
   if (options.chunk_bytes == 0) {
     return InvalidArgument("chunk_bytes is 0, must be positive", "chunk_bytes");
   }
@@ -322,7 +362,8 @@ Result<std::unique_ptr<Writer>> Writer::Create(ByteSink& sink, WriterOptions opt
         "zstd_level is " + std::to_string(options.zstd_level) + ", must lie between 1 and 19",
         "zstd_level");
   }
-  auto writer = std::make_unique<McapWriter>(sink, std::move(options));
+  if (scratch == nullptr) scratch = std::make_unique<MemoryScratch>();
+  auto writer = std::make_unique<McapWriter>(sink, std::move(options), std::move(scratch));
   if (const Status begun = writer->Begin(); !begun.ok()) return begun.error();
   return std::unique_ptr<Writer>(std::move(writer));
 }

@@ -32,6 +32,9 @@ class ByteSource {
   virtual Result<std::size_t> Read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
 };
 
+/// Bytes that a writer puts aside until it closes.
+class ByteScratch : public ByteSink, public ByteSource {};
+
 class MemorySink final : public ByteSink {
  public:
   Status Write(ByteView bytes) override;
@@ -54,6 +57,17 @@ class MemorySource final : public ByteSource {
 
  private:
   ByteView bytes_;
+};
+
+class MemoryScratch final : public ByteScratch {
+ public:
+  Status Write(ByteView bytes) override { return sink_.Write(bytes); }
+  Status Sync() override { return {}; }
+  std::uint64_t size() const override { return sink_.bytes().size(); }
+  Result<std::size_t> Read(std::uint64_t offset, std::span<std::uint8_t> out) override;
+
+ private:
+  MemorySink sink_;
 };
 
 }  // namespace exemplar::recording

@@ -51,4 +51,25 @@ class FileSource final : public ByteSource {
   std::filesystem::path path_;
 };
 
+/// A file without name, gone when it is closed. Thread-compatible.
+class FileScratch final : public ByteScratch {
+ public:
+  static Result<std::unique_ptr<FileScratch>> Create(const std::filesystem::path& folder);
+  ~FileScratch() override;
+  FileScratch(const FileScratch&) = delete;
+  FileScratch& operator=(const FileScratch&) = delete;
+
+  Status Write(ByteView bytes) override;
+  Status Sync() override { return {}; }
+  std::uint64_t size() const override { return size_; }
+  Result<std::size_t> Read(std::uint64_t offset, std::span<std::uint8_t> out) override;
+
+ private:
+  FileScratch(int descriptor, std::filesystem::path folder);
+
+  int descriptor_;
+  std::filesystem::path folder_;
+  std::uint64_t size_ = 0;
+};
+
 }  // namespace exemplar::recording

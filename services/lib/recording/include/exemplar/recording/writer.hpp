@@ -36,8 +36,10 @@ struct WriterOptions {
 /// sink holds ends at a whole record, and Recover() makes a closed file of it.
 class Writer {
  public:
-  /// Writes magic and header. The sink must outlive the writer.
-  static Result<std::unique_ptr<Writer>> Create(ByteSink& sink, WriterOptions options = {});
+  /// Writes magic and header. The sink must outlive the writer. Chunk indexes wait in `scratch`
+  /// until Close (null: in memory), so that a long recording takes no more memory than a short one.
+  static Result<std::unique_ptr<Writer>> Create(ByteSink& sink, WriterOptions options = {},
+                                                std::unique_ptr<ByteScratch> scratch = nullptr);
   /// Does not close: a file without Close() is an unfinished recording.
   virtual ~Writer() = default;
 
