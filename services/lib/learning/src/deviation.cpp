@@ -5,13 +5,19 @@
 namespace exemplar::learning {
 namespace {
 
-Eigen::MatrixXd Positions(std::span<const geometry::Pose> poses, int max_points) {
-  const auto count = static_cast<Eigen::Index>(poses.size());
-  const Eigen::Index rows = std::min<Eigen::Index>(count, max_points);
-  Eigen::MatrixXd positions(rows, 3);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const Eigen::Index from = rows > 1 ? i * (count - 1) / (rows - 1) : count - 1;
-    positions.row(i) = poses[static_cast<std::size_t>(from)].translation.transpose();
+// `count` positions at even parts of the samples.
+Eigen::MatrixXd Positions(std::span<const geometry::Pose> poses, std::size_t count) {
+  Eigen::MatrixXd positions(static_cast<Eigen::Index>(count), 3);
+  const auto last = static_cast<double>(poses.size() - 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double at =
+        count > 1 ? last * static_cast<double>(i) / static_cast<double>(count - 1) : last;
+    const auto k = std::min(static_cast<std::size_t>(at), poses.size() - 1);
+    Eigen::Vector3d position = poses[k].translation;
+    if (k + 1 < poses.size()) {
+      position += (at - static_cast<double>(k)) * (poses[k + 1].translation - position);
+    }
+    positions.row(static_cast<Eigen::Index>(i)) = position.transpose();
   }
   return positions;
 }

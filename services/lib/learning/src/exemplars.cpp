@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact.hpp"
+#include "exemplar/learning/hermite.hpp"
 #include "exemplar/learning/objectivity.hpp"
 #include "rewarp.hpp"
 
@@ -157,6 +158,12 @@ Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
     trial.hand = Eigen::Map<const Eigen::VectorXd>(
         warped.hand_open.data(), static_cast<Eigen::Index>(warped.hand_open.size()));
     trial.touch_n = warped.touch_n;
+    const MonotoneHermite own_at(alignment.knots_s, aligned.own_knots_s);
+    trial.own_time.resize(exemplars.frames);
+    for (int i = 0; i < exemplars.frames; ++i) {
+      trial.own_time[i] =
+          own_at(alignment.time_s[static_cast<std::size_t>(i)]) / aligned.own_knots_s.back();
+    }
     if (exemplars.has_tool) trial.situation.base_T_start = warped.base_T_tool.front();
     const double extent = ToolExtent(warped);
     for (std::size_t o = 0; o < exemplars.object_names.size(); ++o) {

@@ -28,6 +28,7 @@ struct ExemplarTrial {
   Eigen::MatrixXd joints;            ///< frames x joints (or frames x 0)
   Eigen::VectorXd hand;              ///< frames, or empty
   Eigen::VectorXd touch_n;           ///< frames, or empty
+  Eigen::VectorXd own_time;          ///< frames: part of the own duration, 0 to 1
   /// Poses over time of each object that moved, the reference frame of the tool at each frame;
   /// empty for one that rested.
   std::vector<std::vector<geometry::Pose>> moving;

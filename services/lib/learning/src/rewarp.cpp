@@ -52,8 +52,10 @@ std::vector<double> Phase(const Exemplars& exemplars, const ExemplarTrial& trial
     }
     const double whole = length.back();
     for (int i = begin; i <= end; ++i) {
-      const double time = static_cast<double>(i - begin) / (end - begin);
-      const double way = whole > 0 ? length[static_cast<std::size_t>(i - begin)] / whole : time;
+      const double even = static_cast<double>(i - begin) / (end - begin);
+      const double lasted = trial.own_time[end] - trial.own_time[begin];
+      const double time = lasted > 0 ? (trial.own_time[i] - trial.own_time[begin]) / lasted : even;
+      const double way = whole > 0 ? length[static_cast<std::size_t>(i - begin)] / whole : even;
       const double part = kTimePart * time + (1 - kTimePart) * way;
       phase[static_cast<std::size_t>(i)] = (begin + part * (end - begin)) / (n - 1);
     }
@@ -96,6 +98,7 @@ ExemplarTrial Rewarped(const ExemplarTrial& trial, std::span<const double> from)
   if (trial.joints.cols() > 0) result.joints = mix(trial.joints);
   if (trial.hand.size() > 0) result.hand = mix(trial.hand);
   if (trial.touch_n.size() > 0) result.touch_n = mix(trial.touch_n);
+  result.own_time = mix(trial.own_time);
   return result;
 }
 
