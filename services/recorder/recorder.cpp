@@ -83,8 +83,12 @@ class RecorderImpl final : public Recorder {
     const std::filesystem::path path = options_.data_dir / (name + ".mcap");
     Result<std::unique_ptr<recording::FileSink>> sink = recording::FileSink::Create(path);
     if (!sink.ok()) return sink.error();
-    Result<std::unique_ptr<RecordingFile>> file = RecordingFile::Create(
-        **sink, options_.file, {name, options_.station, now, request.metadata});
+    Result<std::unique_ptr<recording::FileScratch>> scratch =
+        recording::FileScratch::Create(options_.data_dir);
+    if (!scratch.ok()) return scratch.error();
+    Result<std::unique_ptr<RecordingFile>> file =
+        RecordingFile::Create(**sink, options_.file,
+                              {name, options_.station, now, request.metadata}, std::move(*scratch));
     if (!file.ok()) return file.error();
     {
       const std::lock_guard lock_file(file_mutex_);

@@ -22,11 +22,11 @@ recording::Metadata AboutWriter(const WriterFigures& figures) {
 
 }  // namespace
 
-Result<std::unique_ptr<RecordingFile>> RecordingFile::Create(recording::ByteSink& sink,
-                                                             recording::WriterOptions options,
-                                                             const RecordingInfo& info) {
+Result<std::unique_ptr<RecordingFile>> RecordingFile::Create(
+    recording::ByteSink& sink, recording::WriterOptions options, const RecordingInfo& info,
+    std::unique_ptr<recording::ByteScratch> scratch) {
   Result<std::unique_ptr<recording::Writer>> writer =
-      recording::Writer::Create(sink, std::move(options));
+      recording::Writer::Create(sink, std::move(options), std::move(scratch));
   if (!writer.ok()) return writer.error();
   const recording::Metadata about{
       "exemplar.recording",

@@ -29,10 +29,10 @@ struct RecordingInfo {
 /// Thread-compatible.
 class RecordingFile {
  public:
-  /// The sink must outlive the file.
-  static Result<std::unique_ptr<RecordingFile>> Create(recording::ByteSink& sink,
-                                                       recording::WriterOptions options,
-                                                       const RecordingInfo& info);
+  /// The sink must outlive the file. `scratch`: as recording::Writer takes it.
+  static Result<std::unique_ptr<RecordingFile>> Create(
+      recording::ByteSink& sink, recording::WriterOptions options, const RecordingInfo& info,
+      std::unique_ptr<recording::ByteScratch> scratch);
 
   /// `topic` as discovery knows it; without schema the message is written without one.
   Status Write(const ircp::RawTopic& topic, const std::string& source,
