@@ -100,8 +100,8 @@ Follower::Output Follower::Interpolated(Duration now) {
   const Setpoint& after = samples_[1].setpoint;
   const double span = ToSeconds(after.stamp - before.stamp);
   const double s = ToSeconds(at - SinceEpoch(before.stamp)) / span;
-  if (s <= 0) return {before.positions, still};
-  if (s >= 1) return {after.positions, still};
+  if (s < 0) return {before.positions, still};
+  if (s > 1) return {after.positions, still};
   const Eigen::VectorXd way = after.positions - before.positions;
   return {before.positions + s * way, way / span};
 }
