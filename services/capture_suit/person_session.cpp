@@ -1,0 +1,219 @@
+#include "capture_suit/person_session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "capture_suit/places.hpp"
+#include "exemplar/base/text.hpp"
+
+namespace exemplar::capture_suit {
+namespace {
+
+constexpr const char* kSource = "suit";
+constexpr Duration kReaderTimeout = std::chrono::seconds(5);
+constexpr Duration kPollInterval = std::chrono::milliseconds(20);
+constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
+constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(5);
+constexpr double kWayToStart = 1.0;  // s
+
+Result<scene::Button> FindButton(const scene::Description& scene, const std::string& name) {
+  if (scene.buttons.empty()) return InvalidArgument("the scene has no button to press", "scene");
+  if (name.empty()) return scene.buttons.front();
+  std::vector<std::string> names;
+  for (const scene::Button& button : scene.buttons) {
+    if (button.name == name) return button;
+    names.push_back(button.name);
+  }
+  const std::optional<std::string> near = NearestName(name, names);
+  return NotFound(
+      "the scene has no button \"" + name + '"' + (near ? "; did you mean \"" + *near + "\"?" : ""),
+      "object");
+}
+
+std::string PlaceText(const geometry::Pose& pose) {
+  return "(" + FormatFixed(pose.translation.x(), 2) + ", " + FormatFixed(pose.translation.y(), 2) +
+         ")";
+}
+
+Error Cancelled() { return {ErrorCode::kCancelled, "stopped before the last trial had ended"}; }
+
+}  // namespace
+
+PersonSession::PersonSession(const Clock& clock, Log& log, scene::Button button,
+                             std::vector<geometry::Pose> places, reaching::Person person,
+                             const PersonSessionOptions& options)
+    : clock_(clock),
+      log_(log),
+      button_(std::move(button)),
+      places_(std::move(places)),
+      person_(std::move(person)),
+      options_(options),
+      posture_(person_.rest()) {}
+
+Result<std::unique_ptr<PersonSession>> PersonSession::Create(
+    ircp::Bus& bus, const Clock& clock, Log& log, const kinematics::RobotDescription& robot,
+    const scene::Description& scene, const PersonSessionOptions& options) {
+  Result<scene::Button> button = FindButton(scene, options.object);
+  if (!button) return button.error();
+  std::vector<geometry::Pose> places = {button->base_T_object};
+  if (!options.places.empty()) {
+    Result<std::vector<geometry::Pose>> parsed = ParsePlaces(options.places, button->base_T_object);
+    if (!parsed) return parsed.error();
+    places = std::move(*parsed);
+  }
+  Result<reaching::Person> person = reaching::Person::Create(robot, options.person);
+  if (!person) return person.error();
+
+  std::unique_ptr<PersonSession> session(new PersonSession(
+      clock, log, std::move(*button), std::move(places), std::move(*person), options));
+  auto simulator =
+      ircp::ControlClient::Create(bus, clock, "simulator", kSource, options.person.seed);
+  if (!simulator) return simulator.error();
+  session->simulator_ = std::move(*simulator);
+  if (options.place_only) return session;
+
+  auto suit = bus.MakeWriter<ircp::SuitSample>(kSource);
+  if (!suit) return suit.error();
+  session->suit_ = std::move(*suit);
+  if (options.record) {
+    Result<RecorderRemote> recorder = RecorderRemote::Create(bus, clock, options.person.seed);
+    if (!recorder) return recorder.error();
+    session->recorder_ = std::move(*recorder);
+  }
+  auto control = ircp::ControlServer::Create(
+      bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
+        return {false, "\"" + command.action + "\" is no action of this program", {}};
+      });
+  if (!control) return control.error();
+  session->control_ = std::move(*control);
+  const ircp::Writer<ircp::SuitSample>* writer = session->suit_.get();
+  session->control_->SetSentCounts([writer] {
+    return std::vector<ircp::TopicCount>{{ircp::SuitSample::kTopic, kSource, writer->sent()}};
+  });
+  return session;
+}
+
+Status PersonSession::Run(std::stop_token stop) {
+  if (suit_) WaitForReaders(stop);
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (stop.stop_requested()) return Cancelled();
+    if (Status status = PlaceButton(places_[i]); !status) return status;
+    if (options_.place_only) {
+      log_.Info("button at " + PlaceText(places_[i]));
+    } else if (Status status = Perform(i, stop); !status) {
+      return status;
+    }
+  }
+  if (!suit_) return {};
+  if (Status status = MoveTo(person_.rest(), kWayToStart, stop); !status) return status;
+  if (!suit_->WaitForAcknowledgments(kAcknowledgeTimeout)) {
+    log_.Warning("not every reader has acknowledged the last samples",
+                 {{"topic", ircp::SuitSample::kTopic}});
+  }
+  control_->SetState("done", std::to_string(places_.size()) + " trials performed");
+  return {};
+}
+
+Status PersonSession::PlaceButton(const geometry::Pose& base_T_button) {
+  const Eigen::Vector3d& p = base_T_button.translation;
+  const Eigen::Quaterniond& q = base_T_button.rotation;
+  const Result<ircp::Answer> answer = simulator_->Call("place",
+                                                       {{"object", button_.name},
+                                                        {"x", FormatDouble(p.x())},
+                                                        {"y", FormatDouble(p.y())},
+                                                        {"z", FormatDouble(p.z())},
+                                                        {"qx", FormatDouble(q.x())},
+                                                        {"qy", FormatDouble(q.y())},
+                                                        {"qz", FormatDouble(q.z())},
+                                                        {"qw", FormatDouble(q.w())}},
+                                                       kAnswerTimeout);
+  if (!answer)
+    return WithPlace(answer.error(), "placing the button at " + PlaceText(base_T_button));
+  return {};
+}
+
+Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
+  reaching::Target target;
+  target.name = button_.name;
+  target.base_T_object = places_[index];
+  target.object_p_contact = button_.object_p_contact;
+  target.object_normal = button_.object_normal;
+  const Result<reaching::Demonstration> performed = person_.Press(target);
+  if (!performed) return performed.error();
+  const demonstration::ScalarSeries& joints = performed->trial.joints;
+
+  const std::string trial =
+      "trial " + std::to_string(index + 1) + " of " + std::to_string(places_.size());
+  control_->SetState("moving", "to the start of " + trial);
+  if (Status status =
+          MoveTo(joints.values.row(0).transpose(), std::max(kWayToStart, options_.settle_s), stop);
+      !status) {
+    return status;
+  }
+  if (recorder_) {
+    const std::string name = RecordingName(options_.name, index, places_.size());
+    if (Status status = recorder_->Start(name, performed->trial.source); !status) return status;
+  }
+  control_->SetState("performing", trial);
+  const Duration start = clock_.Steady();
+  Status sent;
+  for (std::size_t k = 0; k < joints.size() && sent; ++k) {
+    if (!clock_.SleepUntil(start + FromSeconds(joints.time_s[k]), stop)) {
+      sent = Cancelled();
+    } else {
+      sent = Send(joints.values.row(static_cast<Eigen::Index>(k)).transpose());
+    }
+  }
+  if (sent && !suit_->WaitForAcknowledgments(kAcknowledgeTimeout)) {
+    log_.Warning("not every reader has acknowledged the trial", {{"trial", index + 1}});
+  }
+  if (recorder_) {
+    const Status stopped = recorder_->Stop();
+    if (!stopped && sent) sent = stopped;
+  }
+  if (sent) {
+    log_.Info(trial + ": button at " + PlaceText(places_[index]) + ", " +
+              FormatFixed(performed->trial.duration_s(), 1) + " s");
+  }
+  return sent;
+}
+
+Status PersonSession::MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop) {
+  const Eigen::VectorXd from = posture_;
+  const int steps = std::max(1, static_cast<int>(std::lround(seconds * options_.person.rate_hz)));
+  const Duration start = clock_.Steady();
+  for (int k = 1; k <= steps; ++k) {
+    if (!clock_.SleepUntil(start + FromSeconds(k / options_.person.rate_hz), stop)) {
+      return Cancelled();
+    }
+    const double s = static_cast<double>(k) / steps;
+    if (Status status = Send(from + s * s * (3 - 2 * s) * (goal - from)); !status) return status;
+  }
+  return {};
+}
+
+Status PersonSession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture) {
+  ircp::SuitSample sample;
+  sample.header.stamp = clock_.Now();
+  sample.names = person_.chain().joint_names();
+  sample.positions.assign(posture.begin(), posture.end());
+  posture_ = posture;
+  return suit_->Write(std::move(sample));
+}
+
+void PersonSession::WaitForReaders(std::stop_token stop) {
+  // The simulated robot, and the recorder where there is one.
+  const int wanted = recorder_ ? 2 : 1;
+  const Duration deadline = clock_.Steady() + kReaderTimeout;
+  while (suit_->matched_readers() < wanted && clock_.Steady() < deadline) {
+    if (!clock_.SleepFor(kPollInterval, stop)) return;
+  }
+  if (suit_->matched_readers() < wanted) {
+    log_.Warning("fewer readers than expected", {{"topic", ircp::SuitSample::kTopic},
+                                                 {"readers", suit_->matched_readers()},
+                                                 {"expected", wanted}});
+  }
+}
+
+}  // namespace exemplar::capture_suit

@@ -1,0 +1,70 @@
+#pragma once
+// A simulated person in the suit, in real time.
+
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "capture_suit/recorder_remote.hpp"
+#include "exemplar/base/clock.hpp"
+#include "exemplar/base/log.hpp"
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/control.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/reaching/person.hpp"
+#include "exemplar/scene/description.hpp"
+
+namespace exemplar::capture_suit {
+
+struct PersonSessionOptions {
+  std::string object;       ///< the button to press; empty: the scene's first
+  std::string places;       ///< as ParsePlaces reads them; empty: where the button is
+  std::string name;         ///< of the recordings
+  bool record = false;      ///< tell the recorder
+  bool place_only = false;  ///< put the button at each place and press nothing
+  double settle_s = 1.0;    ///< from placing the button until the trial may start
+  reaching::PersonOptions person = {};
+};
+
+/// For every place: tells the simulator to put the button there, moves to the start of the trial,
+/// has it recorded, and sends the person's joints on ircp/suit. Thread-compatible; Run on one
+/// thread.
+class PersonSession {
+ public:
+  static Result<std::unique_ptr<PersonSession>> Create(ircp::Bus& bus, const Clock& clock, Log& log,
+                                                       const kinematics::RobotDescription& robot,
+                                                       const scene::Description& scene,
+                                                       const PersonSessionOptions& options);
+
+  /// Ends after the last place, at the first error, or soon after `stop` (kCancelled; a recording
+  /// that runs is stopped first).
+  Status Run(std::stop_token stop);
+
+ private:
+  PersonSession(const Clock& clock, Log& log, scene::Button button,
+                std::vector<geometry::Pose> places, reaching::Person person,
+                const PersonSessionOptions& options);
+
+  Status PlaceButton(const geometry::Pose& base_T_button);
+  Status Perform(std::size_t index, std::stop_token stop);
+  /// Sends a smooth way from where the suit is to `goal`.
+  Status MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop);
+  Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture);
+  void WaitForReaders(std::stop_token stop);
+
+  const Clock& clock_;
+  Log& log_;
+  scene::Button button_;
+  std::vector<geometry::Pose> places_;
+  reaching::Person person_;
+  PersonSessionOptions options_;
+  Eigen::VectorXd posture_;  ///< sent last
+  std::unique_ptr<ircp::Writer<ircp::SuitSample>> suit_;
+  std::unique_ptr<ircp::ControlClient> simulator_;
+  std::optional<RecorderRemote> recorder_;
+  std::unique_ptr<ircp::ControlServer> control_;  ///< destroyed first: it asks suit_ for its count
+};
+
+}  // namespace exemplar::capture_suit

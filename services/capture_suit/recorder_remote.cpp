@@ -1,0 +1,42 @@
+#include "capture_suit/recorder_remote.hpp"
+
+#include <utility>
+
+namespace exemplar::capture_suit {
+namespace {
+
+constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
+
+}  // namespace
+
+RecorderRemote::RecorderRemote(std::unique_ptr<ircp::ControlClient> client)
+    : client_(std::move(client)) {}
+
+Result<RecorderRemote> RecorderRemote::Create(ircp::Bus& bus, const Clock& clock,
+                                              std::uint64_t seed) {
+  auto client = ircp::ControlClient::Create(bus, clock, "recorder", "suit", seed);
+  if (!client) return client.error();
+  return RecorderRemote(std::move(*client));
+}
+
+Status RecorderRemote::Start(const std::string& name, const std::string& source) {
+  return Call("start", {{"name", name}, {"source", source}});
+}
+
+Status RecorderRemote::Stop() { return Call("stop", {}); }
+
+Status RecorderRemote::Call(const std::string& action,
+                            std::map<std::string, std::string> arguments) {
+  const Result<ircp::Answer> answer = client_->Call(action, std::move(arguments), kAnswerTimeout);
+  if (!answer) return WithPlace(answer.error(), "recorder " + action);
+  return {};
+}
+
+std::string RecordingName(const std::string& name, std::size_t index, std::size_t count) {
+  if (count == 1 && !name.empty()) return name;
+  const std::string number = std::to_string(index + 1);
+  return (name.empty() ? "trial" : name) + "-" +
+         std::string(number.size() < 3 ? 3 - number.size() : 0, '0') + number;
+}
+
+}  // namespace exemplar::capture_suit

@@ -1,0 +1,27 @@
+#pragma once
+#include <memory>
+#include <string>
+
+#include "exemplar/ircp/control.hpp"
+
+namespace exemplar::capture_suit {
+
+/// Tells the recorder when a trial starts and ends, over ircp/recorder/command. Thread-compatible.
+class RecorderRemote {
+ public:
+  static Result<RecorderRemote> Create(ircp::Bus& bus, const Clock& clock, std::uint64_t seed);
+
+  Status Start(const std::string& name, const std::string& source);
+  Status Stop();
+
+ private:
+  explicit RecorderRemote(std::unique_ptr<ircp::ControlClient> client);
+  Status Call(const std::string& action, std::map<std::string, std::string> arguments);
+  std::unique_ptr<ircp::ControlClient> client_;
+};
+
+/// The recording's name of trial `index` (from 0) of `count`: `name` itself for a single one, else
+/// "NAME-001". An empty name becomes "trial".
+std::string RecordingName(const std::string& name, std::size_t index, std::size_t count);
+
+}  // namespace exemplar::capture_suit

@@ -1,0 +1,116 @@
+#include "capture_suit/replay_session.hpp"
+
+#include <cassert>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include "exemplar/base/text.hpp"
+#include "exemplar/demonstration/csv.hpp"
+
+namespace exemplar::capture_suit {
+namespace {
+
+constexpr Duration kReaderTimeout = std::chrono::seconds(5);
+constexpr Duration kPollInterval = std::chrono::milliseconds(20);
+constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(5);
+
+}  // namespace
+
+Result<demonstration::Trial> ReadTrialFile(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf())) {
+    return NotFound(file.string() + ": cannot be read", "replay");
+  }
+  return demonstration::ReadCsv(text.str(), file.string());
+}
+
+ReplaySession::ReplaySession(const Clock& clock, Log& log, std::vector<demonstration::Trial> trials,
+                             TrialStreams streams, const ReplayOptions& options)
+    : clock_(clock),
+      log_(log),
+      trials_(std::move(trials)),
+      streams_(std::move(streams)),
+      options_(options) {}
+
+Result<std::unique_ptr<ReplaySession>> ReplaySession::Create(
+    ircp::Bus& bus, const Clock& clock, Log& log, std::vector<demonstration::Trial> trials,
+    const ReplayOptions& options) {
+  assert(!trials.empty());
+  if (!std::isfinite(options.rate) || options.rate <= 0) {
+    return InvalidArgument("rate is " + FormatDouble(options.rate) + ", must be positive", "rate");
+  }
+  // Only to see which topics are needed: stamps are given when a trial is played.
+  std::vector<ircp::TrialSamples> samples;
+  for (const demonstration::Trial& trial : trials) {
+    samples.push_back(ircp::SamplesOf(trial, Stamp{}, options.frame));
+  }
+  Result<TrialStreams> streams = TrialStreams::Create(bus, samples);
+  if (!streams) return streams.error();
+  std::unique_ptr<ReplaySession> session(
+      new ReplaySession(clock, log, std::move(trials), std::move(*streams), options));
+  if (options.record) {
+    Result<RecorderRemote> recorder = RecorderRemote::Create(bus, clock, options.seed);
+    if (!recorder) return recorder.error();
+    session->recorder_ = std::move(*recorder);
+  }
+  auto control = ircp::ControlServer::Create(
+      bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
+        return {false, "\"" + command.action + "\" is no action of this program", {}};
+      });
+  if (!control) return control.error();
+  session->control_ = std::move(*control);
+  const TrialStreams* counted = &session->streams_;
+  session->control_->SetSentCounts([counted] { return counted->sent(); });
+  return session;
+}
+
+Status ReplaySession::Run(std::stop_token stop) {
+  WaitForReaders(stop);
+  for (std::size_t i = 0; i < trials_.size(); ++i) {
+    if (Status status = PlayOne(i, stop); !status) return status;
+  }
+  control_->SetState("done", std::to_string(trials_.size()) + " trials played");
+  return {};
+}
+
+Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
+  const demonstration::Trial& trial = trials_[index];
+  const std::string place =
+      "trial " + std::to_string(index + 1) + " of " + std::to_string(trials_.size());
+  for (const std::string& notice : trial.notices) log_.Warning(notice);
+  if (recorder_) {
+    const std::string name = RecordingName(options_.name, index, trials_.size());
+    if (Status status = recorder_->Start(name, trial.source); !status) return status;
+  }
+  control_->SetState("playing", trial.source);
+  const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);
+  for (const std::string& notice : samples.notices) log_.Warning(trial.source + ": " + notice);
+  Status played = streams_.Play(samples, options_.rate, clock_, stop);
+  if (played && !streams_.WaitForAcknowledgments(kAcknowledgeTimeout)) {
+    log_.Warning("not every reader has acknowledged the trial", {{"trial", trial.source}});
+  }
+  control_->SetState("idle", trial.source + " played");
+  if (recorder_) {
+    const Status stopped = recorder_->Stop();
+    if (played && !stopped) played = stopped;
+  }
+  if (played) {
+    log_.Info(place + ": " + trial.source + ", " + FormatFixed(trial.duration_s(), 1) + " s");
+  }
+  return played;
+}
+
+void ReplaySession::WaitForReaders(std::stop_token stop) {
+  const Duration deadline = clock_.Steady() + kReaderTimeout;
+  while (!streams_.UnreadTopics().empty() && clock_.Steady() < deadline) {
+    if (!clock_.SleepFor(kPollInterval, stop)) return;
+  }
+  for (const std::string& topic : streams_.UnreadTopics()) {
+    log_.Warning("nobody reads", {{"topic", topic}});
+  }
+}
+
+}  // namespace exemplar::capture_suit

@@ -1,0 +1,58 @@
+#pragma once
+// Trial files played onto the topics, as if their people stood here.
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "capture_suit/recorder_remote.hpp"
+#include "capture_suit/trial_streams.hpp"
+#include "exemplar/base/clock.hpp"
+#include "exemplar/base/log.hpp"
+#include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/control.hpp"
+
+namespace exemplar::capture_suit {
+
+struct ReplayOptions {
+  double rate = 1;             ///< so many times faster than recorded
+  bool record = false;         ///< tell the recorder to start and stop around each trial
+  std::string name;            ///< of the recordings
+  std::string frame = "base";  ///< the frame of the files' poses
+  std::uint64_t seed = 1;      ///< of request ids
+};
+
+/// Reads a trial CSV. Errors name file, line and column.
+Result<demonstration::Trial> ReadTrialFile(const std::filesystem::path& file);
+
+/// Thread-compatible; Run on one thread.
+class ReplaySession {
+ public:
+  /// Precondition: trials is not empty.
+  static Result<std::unique_ptr<ReplaySession>> Create(ircp::Bus& bus, const Clock& clock, Log& log,
+                                                       std::vector<demonstration::Trial> trials,
+                                                       const ReplayOptions& options);
+
+  /// Plays every trial once somebody reads (or after some seconds, with a warning), and ends when
+  /// the readers have acknowledged. kCancelled soon after `stop`; a recording is stopped first.
+  Status Run(std::stop_token stop);
+
+ private:
+  ReplaySession(const Clock& clock, Log& log, std::vector<demonstration::Trial> trials,
+                TrialStreams streams, const ReplayOptions& options);
+  void WaitForReaders(std::stop_token stop);
+  Status PlayOne(std::size_t index, std::stop_token stop);
+
+  const Clock& clock_;
+  Log& log_;
+  std::vector<demonstration::Trial> trials_;
+  TrialStreams streams_;
+  ReplayOptions options_;
+  std::optional<RecorderRemote> recorder_;
+  std::unique_ptr<ircp::ControlServer> control_;  ///< destroyed first: it asks streams_ for counts
+};
+
+}  // namespace exemplar::capture_suit
