@@ -72,6 +72,7 @@ std::string ReportText(const learning::SkillReport& report) {
     }
     text += methods.Text(2);
   }
+  for (const std::string& note : report.notes) text += "note: " + note + '\n';
   for (const std::string& warning : report.warnings) text += "warning: " + warning + '\n';
   return text;
 }

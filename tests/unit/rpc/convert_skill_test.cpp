@@ -171,6 +171,7 @@ TEST(ConvertSkill, ReportsComeBack) {
     EXPECT_EQ(back->contact_spread_m, report.contact_spread_m);
     EXPECT_EQ(back->mean_correlation, report.mean_correlation);
     EXPECT_EQ(back->plain_correlation, report.plain_correlation);
+    EXPECT_EQ(back->notes, report.notes);
     EXPECT_EQ(back->warnings, report.warnings);
     ASSERT_EQ(back->trials.size(), report.trials.size());
     for (std::size_t t = 0; t < report.trials.size(); ++t) {

@@ -176,6 +176,7 @@ inline learning::SkillReport RandomReport(Rng& rng) {
                      .end_error_m = rng.Uniform(),
                      .frechet_by_trial_m = RandomNumbers(rng, 3),
                      .chosen = true}};
+  report.notes = RandomTexts(rng, 2);
   report.warnings = RandomTexts(rng, 2);
   return report;
 }

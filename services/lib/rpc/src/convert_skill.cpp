@@ -39,6 +39,7 @@ void ToProto(const learning::SkillReport& report, v1::SkillReport* message) {
     ToProto(score.frechet_by_trial_m, out->mutable_frechet_by_trial_m());
     out->set_chosen(score.chosen);
   }
+  ToProto(report.notes, message->mutable_notes());
   ToProto(report.warnings, message->mutable_warnings());
 }
 
@@ -84,6 +85,7 @@ Result<learning::SkillReport> FromProto(const v1::SkillReport& message) {
     score.frechet_by_trial_m = FromProto(in.frechet_by_trial_m());
     score.chosen = in.chosen();
   }
+  report.notes = FromProto(message.notes());
   report.warnings = FromProto(message.warnings());
   return report;
 }
