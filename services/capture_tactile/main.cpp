@@ -1,0 +1,33 @@
+// exemplar-capture-tactile: what the hand feels, onto ircp/tactile.
+
+#include "capture_tactile/session.hpp"
+#include "exemplar/bus/participant.hpp"
+#include "exemplar/program/options.hpp"
+#include "exemplar/program/runtime.hpp"
+
+int main(int argc, char** argv) {
+  using namespace exemplar;
+  constexpr const char* kName = "exemplar-capture-tactile";
+  bool from_robot = false;
+  capture_tactile::SessionOptions session_options;
+  program::Options options(kName, "Sends touch forces on ircp/tactile",
+                           "exemplar-capture-tactile --from-robot --station lab", {.bus = true});
+  options.Add("--from-robot", from_robot, "the robot's own hand, from ircp/joint_state").Required();
+  options.Add("--rate-hz", session_options.rate_hz, "how often the newest force is sent")
+      .MinMax(1, 1000);
+  if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
+
+  const program::Signals signals;
+  const std::unique_ptr<Log> log = program::MakeLog(options.common(), "capture-tactile");
+  const SystemClock clock;
+  auto participant = bus::Participant::Create({.domain = options.common().domain,
+                                               .station = options.common().station,
+                                               .name = kName,
+                                               .clock = &clock,
+                                               .log = log.get()});
+  if (!participant) return program::Fail(kName, participant.error());
+  auto session = capture_tactile::Session::Create(**participant, clock, *log, session_options);
+  if (!session) return program::Fail(kName, session.error());
+  (*session)->Run(signals.token());
+  return 0;
+}
