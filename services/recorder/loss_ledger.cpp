@@ -11,9 +11,6 @@ constexpr Duration kRateWindow = std::chrono::seconds(1);
 /// The part of a writer's identity that all endpoints of one program share.
 std::string ParticipantOf(const std::string& writer) { return writer.substr(0, writer.find('|')); }
 
-/// The types of idl/ number their samples themselves.
-bool HasHeader(const std::string& type) { return type.starts_with("exemplar::ircp::"); }
-
 std::uint64_t Since(std::uint64_t now, std::uint64_t before) {
   return now > before ? now - before : 0;  // a gap may have been filled in between
 }
@@ -31,6 +28,7 @@ std::vector<WriterFigures> Difference(const std::vector<WriterFigures>& now,
     if (old != before.end()) {
       figures.received = Since(writer.received, old->received);
       figures.lost_in_gaps = Since(writer.lost_in_gaps, old->lost_in_gaps);
+      figures.lost_at_end = Since(writer.lost_at_end, old->lost_at_end);
       figures.dropped = Since(writer.dropped, old->dropped);
       if (figures.received == 0 && figures.lost() == 0) continue;
     }
@@ -42,7 +40,14 @@ std::vector<WriterFigures> Difference(const std::vector<WriterFigures>& now,
 void LossLedger::AddTopic(const ircp::RawTopic& topic) {
   TopicEntry& entry = topics_[topic.topic];
   // A writer without schema does not take away what another one brought.
-  if (entry.topic.schema.empty() || !topic.schema.empty()) entry.topic = topic;
+  if (!entry.topic.schema.empty() && topic.schema.empty()) return;
+  entry.topic = topic;
+  entry.header = ReadHeaderLayout(topic.schema, topic.type);
+}
+
+std::optional<HeaderLayout> LossLedger::HeaderOf(const std::string& topic) const {
+  const auto found = topics_.find(topic);
+  return found == topics_.end() ? std::nullopt : found->second.header;
 }
 
 const ircp::RawTopic* LossLedger::FindTopic(const std::string& topic) const {
@@ -58,7 +63,7 @@ void LossLedger::AddReceived(const ircp::RawSample& sample,
   if (header && sample.valid) {
     writer.source = header->source;
     writer.sequences.Insert(header->seq);
-  } else if (!HasHeader(topic.topic.type)) {
+  } else if (!topic.header) {
     writer.sequences.Insert(sample.sequence);
     if (!sample.valid) ++writer.ended_instances;
   }

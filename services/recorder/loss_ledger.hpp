@@ -37,9 +37,11 @@ class LossLedger {
  public:
   void AddTopic(const ircp::RawTopic& topic);
   const ircp::RawTopic* FindTopic(const std::string& topic) const;
+  /// nullopt for types whose samples carry no numbers of their own.
+  std::optional<HeaderLayout> HeaderOf(const std::string& topic) const;
 
-  /// `header` where the type has one: its numbers count, else those of the protocol. Samples that
-  /// only end an instance use up a number of the protocol and none of the header.
+  /// `header` where the type has one (HeaderOf): its numbers count, else those of the protocol.
+  /// Samples that only end an instance use up a number of the protocol and none of the header.
   void AddReceived(const ircp::RawSample& sample, const std::optional<SampleHeader>& header,
                    Duration steady_now);
   void AddDropped(const std::string& topic, const std::string& writer);
@@ -61,6 +63,7 @@ class LossLedger {
   };
   struct TopicEntry {
     ircp::RawTopic topic;
+    std::optional<HeaderLayout> header;
     std::map<std::string, WriterEntry> writers;
     Duration window_start{0};
     std::uint64_t in_window = 0;

@@ -207,17 +207,16 @@ class RecorderImpl final : public Recorder {
   }
 
   void OnSample(ircp::RawSample&& sample) {
-    bool has_header = false;
+    std::optional<HeaderLayout> layout;
     bool is_status = false;
     {
       const std::lock_guard lock(mutex_);
-      if (const ircp::RawTopic* topic = ledger_.FindTopic(sample.topic)) {
-        has_header = topic->type.starts_with("exemplar::ircp::");
-        is_status = has_header && topic->type.ends_with("::Status");
-      }
+      layout = ledger_.HeaderOf(sample.topic);
+      const ircp::RawTopic* topic = ledger_.FindTopic(sample.topic);
+      is_status = topic != nullptr && topic->type == "exemplar::ircp::v1::Status";
     }
     std::optional<SampleHeader> header;
-    if (has_header && sample.valid) header = ReadSampleHeader(sample.cdr);
+    if (layout && sample.valid) header = ReadSampleHeader(sample.cdr, *layout);
     std::vector<ircp::TopicCount> announced;
     if (is_status && sample.valid) {
       Result<ircp::StatusSample> status = decode_status_(sample.cdr);

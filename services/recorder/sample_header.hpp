@@ -3,17 +3,28 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace exemplar::recorder {
 
-/// What every type under exemplar::ircp begins with (idl/common.idl).
+/// What every type under exemplar::ircp begins with (idl/common.idl): its keys, of which `source`
+/// is the first and all are strings, and then `seq`.
 struct SampleHeader {
   std::string source;
   std::uint64_t seq = 0;
 };
 
-/// Reads it from a sample's CDR bytes (XCDR1, either byte order, with encapsulation); nullopt when
-/// they are too short for it.
-std::optional<SampleHeader> ReadSampleHeader(std::span<const std::uint8_t> cdr);
+struct HeaderLayout {
+  int keys = 1;
+};
+
+/// The layout that a type's flattened IDL tells; nullopt for types that begin otherwise.
+/// `type` is the name on the network ("exemplar::ircp::v1::Suit").
+std::optional<HeaderLayout> ReadHeaderLayout(std::string_view idl, std::string_view type);
+
+/// Reads the header from a sample's CDR bytes (XCDR1, either byte order, with encapsulation);
+/// nullopt when they are too short for it.
+std::optional<SampleHeader> ReadSampleHeader(std::span<const std::uint8_t> cdr,
+                                             HeaderLayout layout = {});
 
 }  // namespace exemplar::recorder

@@ -5,6 +5,13 @@
 
 namespace exemplar::recorder {
 
+/// IDL of a type that begins as those of idl/ do.
+inline std::string HeaderIdl(const std::string& type, const std::string& more_keys = "") {
+  return "module exemplar { struct Part { double x; };\n/* numbered */ @final struct " + type +
+         " {\n  @key string source;  // who\n" + more_keys + "  unsigned long long seq;\n" +
+         "  long long stamp_ns;\n}; };\n";
+}
+
 /// The beginning of a sample as idl/common.idl has it, little- or big-endian, and `extra` bytes.
 inline std::vector<std::uint8_t> SampleBytes(const std::string& source, std::uint64_t seq,
                                              std::size_t extra = 8, bool little_endian = true) {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "cdr.hpp"
 #include "exemplar/base/rng.hpp"
 
 namespace exemplar::recorder {
@@ -14,7 +15,7 @@ ircp::RawTopic Topic(const std::string& name, const std::string& type) {
   ircp::RawTopic topic;
   topic.topic = name;
   topic.type = type;
-  topic.schema = "struct X {};";
+  topic.schema = type.starts_with("exemplar") ? HeaderIdl("Suit") : "struct Reading { long x; };";
   return topic;
 }
 

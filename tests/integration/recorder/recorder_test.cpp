@@ -178,8 +178,8 @@ class RecorderTest : public ::testing::Test {
         Recorder::Create(bus_, clock_, log_, decode, settings_);
     ASSERT_TRUE(made.ok()) << made.error().message;
     recorder_ = std::move(*made);
-    bus_.AddWriter(kSuit, "exemplar::ircp::v1::Suit", "struct Suit {};");
-    bus_.AddWriter(kStatus, "exemplar::ircp::v1::Status", "struct Status {};");
+    bus_.AddWriter(kSuit, "exemplar::ircp::v1::Suit", HeaderIdl("Suit"));
+    bus_.AddWriter(kStatus, "exemplar::ircp::v1::Status", HeaderIdl("Status"));
     bus_.AddWriter("ircp/strange", "lab::Reading", "");
     bus_.AddWriter("rosout", "rcl::Log", "struct Log {};");
   }
@@ -226,7 +226,7 @@ TEST_F(RecorderTest, RecordsEverySampleWithSchemaNumbersAndTimes) {
   EXPECT_EQ(file.schemas[0].name, "exemplar::ircp::v1::Suit");
   EXPECT_EQ(file.schemas[0].encoding, "omgidl");
   EXPECT_EQ(std::string(file.schemas[0].data.begin(), file.schemas[0].data.end()),
-            "struct Suit {};");
+            HeaderIdl("Suit"));
   ASSERT_EQ(file.channels.size(), 2u);
   ASSERT_EQ(file.messages.size(), 110u);
   const recording::Message& first = file.messages[0];
@@ -342,7 +342,7 @@ TEST_F(RecorderTest, WaitsForExpectedWritersAndNamesThoseThatNeverCame) {
   EXPECT_EQ(refused.error().message, "no writer of ircp/tactile after 2 s");
   EXPECT_EQ(recorder_->GetStatus()->state, "ready");
   EXPECT_FALSE(std::filesystem::exists(PathOf("a")));
-  bus_.AddWriter("ircp/tactile", "exemplar::ircp::v1::Tactile", "struct Tactile {};");
+  bus_.AddWriter("ircp/tactile", "exemplar::ircp::v1::Tactile", HeaderIdl("Tactile"));
   EXPECT_TRUE(
       recorder_->Start({.name = "a", .metadata = {}, .expected_topics = {"ircp/tactile"}}).ok());
 }

@@ -21,6 +21,30 @@ TEST(SampleHeader, IsReadInEitherByteOrderForAnyNameLength) {
   }
 }
 
+TEST(SampleHeader, IsFoundBehindFurtherKeys) {
+  const std::optional<HeaderLayout> layout = ReadHeaderLayout(
+      HeaderIdl("EndEffector", "  @key string hand;\n"), "exemplar::ircp::v1::EndEffector");
+  ASSERT_TRUE(layout.has_value());
+  EXPECT_EQ(layout->keys, 2);
+  // source "ab", hand "left", seq 9: the second string begins at 8, the number at 24.
+  const std::vector<std::uint8_t> cdr = {0, 1, 0, 0, 3,   0,   0,   0,   'a', 'b', 0, 0,
+                                         5, 0, 0, 0, 'l', 'e', 'f', 't', 0,   0,   0, 0,
+                                         0, 0, 0, 0, 9,   0,   0,   0,   0,   0,   0, 0};
+  const std::optional<SampleHeader> header = ReadSampleHeader(cdr, *layout);
+  ASSERT_TRUE(header.has_value());
+  EXPECT_EQ(header->source, "ab");
+  EXPECT_EQ(header->seq, 9u);
+}
+
+TEST(SampleHeader, HasALayoutOnlyWhereTheTypeBeginsSo) {
+  EXPECT_EQ(ReadHeaderLayout(HeaderIdl("Suit"), "exemplar::ircp::v1::Suit")->keys, 1);
+  EXPECT_FALSE(ReadHeaderLayout(HeaderIdl("Suit"), "exemplar::ircp::v1::Camera").has_value());
+  EXPECT_FALSE(ReadHeaderLayout(HeaderIdl("Suit"), "Part").has_value());
+  EXPECT_FALSE(ReadHeaderLayout("struct X { unsigned long long seq; };", "X").has_value());
+  EXPECT_FALSE(ReadHeaderLayout("struct X { @key string source;", "X").has_value());
+  EXPECT_FALSE(ReadHeaderLayout("", "X").has_value());
+}
+
 TEST(SampleHeader, IsAbsentWhereTheBytesAreCut) {
   const std::vector<std::uint8_t> whole = SampleBytes("suit", 7, 0);
   for (std::size_t size = 0; size < whole.size(); ++size) {
