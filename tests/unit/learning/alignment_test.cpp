@@ -275,6 +275,47 @@ TEST(Align, StopsWhenAskedAndRefusesNoTrials) {
   EXPECT_EQ(none.error().code, ErrorCode::kInvalidArgument);
 }
 
+// Whatever the trials are like: very short, spiky, still, in motion throughout.
+TEST(Align, AnyTrialsGiveOneFiniteMotion) {
+  Rng rng(12);
+  for (int round = 0; round < 60; ++round) {
+    std::vector<UniformTrial> trials;
+    const std::size_t n = 1 + rng.Below(5);
+    for (std::size_t i = 0; i < n; ++i) {
+      UniformTrial trial = EvenTrial(rng.Uniform(0.1, 1.5), rng.Uniform(50, 60));
+      trial.id = "t" + std::to_string(i);
+      const auto frames = static_cast<Eigen::Index>(trial.time_s.size());
+      trial.joints = Eigen::MatrixXd::Zero(frames, 2);
+      trial.touch_n = Eigen::VectorXd::Zero(frames);
+      const std::uint64_t kind = rng.Below(4);
+      double level = 0, force = 0;
+      for (Eigen::Index k = 0; k < frames; ++k) {
+        if (kind == 1) level += rng.Normal(0, 0.05);
+        if (kind == 2) level += rng.Uniform() < 0.05 ? 1.0 : 0.0;
+        if (kind == 3) level += 0.01;
+        if (rng.Uniform() < 0.03) force = rng.Uniform() < 0.5 ? 0 : rng.Uniform(0, 20);
+        trial.joints.row(k) << level, -level;
+        trial.touch_n[k] = force;
+      }
+      trials.push_back(trial);
+    }
+    LearnOptions options;
+    options.selection = round % 2 == 0 ? Selection::kJoint : Selection::kVote;
+    options.rule = round % 3 == 0 ? EpisodeRule::kLiteral : EpisodeRule::kTwitch;
+    options.force_rate = round % 5 == 0 ? ForceRate::kSigned : ForceRate::kAbsolute;
+    const Alignment aligned = Aligned(trials, options);
+    ASSERT_EQ(aligned.trials.size(), n);
+    EXPECT_TRUE(aligned.canonical_joints.allFinite());
+    for (const AlignedTrial& trial : aligned.trials) {
+      for (std::size_t k = 1; k < trial.own_knots_s.size(); ++k) {
+        ASSERT_GT(trial.own_knots_s[k], trial.own_knots_s[k - 1]);
+      }
+      EXPECT_LE(trial.warped.joints.maxCoeff(), trial.own.joints.maxCoeff() + 1e-12);
+      EXPECT_GE(trial.warped.joints.minCoeff(), trial.own.joints.minCoeff() - 1e-12);
+    }
+  }
+}
+
 TEST(WarpTrial, OneWarpServesAllStreams) {
   Rng rng(11);
   UniformTrial trial = EvenTrial(3, 60);
