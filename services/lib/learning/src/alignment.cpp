@@ -38,6 +38,12 @@ Eigen::VectorXd Condensed(const Eigen::VectorXd& signal) {
   return means;
 }
 
+// Who stays when there are too many candidates: touch was measured, motion only exceeds a level.
+double ScoreOf(const Marker& marker) {
+  constexpr double kTouchFirst = 1000;
+  return marker.score + kTouchFirst * Rank(marker);
+}
+
 Candidates CandidatesOf(const UniformTrial& trial, const Segmentation& segmentation) {
   constexpr double kNear_s = 0.1;
   constexpr double kNearPart = 0.02;  // of the trial
@@ -56,15 +62,15 @@ Candidates CandidatesOf(const UniformTrial& trial, const Segmentation& segmentat
     const double time_s = std::clamp(marker.time_s, edge_s, duration_s - edge_s);
     if (!result.marker.empty() && time_s - result.choice.time_s.back() < near_s) {
       const Marker& before = segmentation.markers[static_cast<std::size_t>(result.marker.back())];
-      if (std::pair(Rank(marker), marker.score) > std::pair(Rank(before), before.score)) {
+      if (ScoreOf(marker) > ScoreOf(before)) {
         result.choice.time_s.back() = time_s;
-        result.choice.score.back() = marker.score;
+        result.choice.score.back() = ScoreOf(marker);
         result.marker.back() = static_cast<int>(m);
       }
       continue;
     }
     result.choice.time_s.push_back(time_s);
-    result.choice.score.push_back(marker.score);
+    result.choice.score.push_back(ScoreOf(marker));
     result.marker.push_back(static_cast<int>(m));
   }
   return result;
