@@ -11,11 +11,18 @@ namespace exemplar::ircp {
 namespace {
 
 constexpr Duration kRepeatPeriod = std::chrono::seconds(1);
+constexpr Duration kMatchPeriod = std::chrono::milliseconds(10);
+
+/// Two runs of a program with one seed must not repeat each other's request ids: the server would
+/// take the second run's commands for repetitions of the first's.
+std::uint64_t SeedOfIds(std::uint64_t seed, const Clock& clock) {
+  return seed * 0x9e3779b97f4a7c15ULL ^ static_cast<std::uint64_t>(clock.Now().nanoseconds());
+}
 
 class Client final : public ControlClient {
  public:
   Client(const Clock& clock, std::string program, std::uint64_t seed)
-      : clock_(clock), program_(std::move(program)), rng_(seed) {}
+      : clock_(clock), program_(std::move(program)), rng_(SeedOfIds(seed, clock)) {}
 
   ~Client() override { reader_.reset(); }
 
@@ -57,6 +64,14 @@ class Client final : public ControlClient {
   };
 
   Result<Answer> Ask(const CommandSample& command, const Pending& pending, Duration deadline) {
+    // Commands are volatile: what nobody reads yet is gone.
+    while (writer_->matched_readers() == 0) {
+      if (clock_.Steady() >= deadline) {
+        return Unavailable("nobody listens on " + CommandTopic(program_) + ": is " + program_ +
+                           " running in this station?");
+      }
+      clock_.SleepUntil(std::min(deadline, clock_.Steady() + kMatchPeriod), {});
+    }
     while (true) {
       if (Status sent = writer_->Write(command); !sent) return sent.error();
       const Duration next = std::min(deadline, clock_.Steady() + kRepeatPeriod);
