@@ -117,7 +117,7 @@ class Writer {
                             {"boundinertia", 1e-6}});
     xml_.Empty("option",
                {{"timestep", options_.step_s}, {"integrator", "implicit"}, {"cone", "elliptic"}});
-    xml_.Empty("size", {{"njmax", 4000.0}, {"nconmax", 1000.0}});
+    xml_.Empty("size", {{"njmax", 800.0}, {"nconmax", 200.0}});
     xml_.Empty("statistic", {{"extent", 1.0}, {"center", {0, 0, 0}}});
     WriteVisual();
     xml_.Open("asset");
