@@ -11,6 +11,8 @@ namespace {
 
 using namespace exemplar;
 
+constexpr int kUsageExitCode = 2;
+
 struct Arguments {
   std::vector<std::string> replay;
   capture_suit::ReplayOptions replay_options;
@@ -69,15 +71,18 @@ int main(int argc, char** argv) {
   options.Add("--places", person.places, "x,y[,z[,qx,qy,qz,qw]];... of the button, base frame, m");
   options.Add("--object", person.object, "the button to press; the scene's first when not given");
   options.Add("--place-only", person.place_only, "put the button there and press nothing");
-  options.Add("--press-depth", person.person.press_depth_m, "below the button's face, m")
-      .MinMax(1e-4, 0.05);
+  options
+      .Add("--press-depth", person.press_depth_m,
+           "below the button's face, m; 0: its travel and 3 mm more")
+      .MinMax(0, 0.05);
   options.Add("--tempo", person.person.tempo, "of the person; 2: twice as fast").MinMax(0.2, 5);
   options.Add("--seed", arguments.seed, "of the person's chance").MinMax(0, 2e9);
   options.Add("--record", arguments.record, "have the recorder record every trial");
   options.Add("--name", arguments.name, "of the recordings; several are numbered NAME-001");
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
   if (arguments.person == !arguments.replay.empty()) {
-    return program::Fail(kName, InvalidArgument("give --replay FILE... or --person, one of them"));
+    program::Fail(kName, InvalidArgument("give --replay FILE... or --person, one of them"));
+    return kUsageExitCode;
   }
   arguments.replay_options.record = person.record = arguments.record;
   arguments.replay_options.name = person.name = arguments.name;

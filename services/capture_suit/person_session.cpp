@@ -15,7 +15,8 @@ constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
 constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(5);
-constexpr double kWayToStart = 1.0;  // s
+constexpr double kWayToStart = 1.0;      // s
+constexpr double kBeyondTravel = 0.003;  // m, as one presses who wants to feel the stop
 
 Result<scene::Button> FindButton(const scene::Description& scene, const std::string& name) {
   if (scene.buttons.empty()) return InvalidArgument("the scene has no button to press", "scene");
@@ -62,7 +63,10 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
     if (!parsed) return parsed.error();
     places = std::move(*parsed);
   }
-  Result<reaching::Person> person = reaching::Person::Create(robot, options.person);
+  reaching::PersonOptions habits = options.person;
+  habits.press_depth_m =
+      options.press_depth_m != 0 ? options.press_depth_m : button->travel_m + kBeyondTravel;
+  Result<reaching::Person> person = reaching::Person::Create(robot, habits);
   if (!person) return person.error();
 
   std::unique_ptr<PersonSession> session(new PersonSession(

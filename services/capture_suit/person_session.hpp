@@ -19,13 +19,14 @@
 namespace exemplar::capture_suit {
 
 struct PersonSessionOptions {
-  std::string object;       ///< the button to press; empty: the scene's first
-  std::string places;       ///< as ParsePlaces reads them; empty: where the button is
-  std::string name;         ///< of the recordings
-  bool record = false;      ///< tell the recorder
-  bool place_only = false;  ///< put the button at each place and press nothing
-  double settle_s = 1.0;    ///< from placing the button until the trial may start
-  reaching::PersonOptions person = {};
+  std::string object;                   ///< the button to press; empty: the scene's first
+  std::string places;                   ///< as ParsePlaces reads them; empty: where the button is
+  std::string name;                     ///< of the recordings
+  bool record = false;                  ///< tell the recorder
+  bool place_only = false;              ///< put the button at each place and press nothing
+  double press_depth_m = 0;             ///< 0: the button's travel and a little more
+  double settle_s = 1.0;                ///< from placing the button until the trial may start
+  reaching::PersonOptions person = {};  ///< its press_depth_m is set from the above
 };
 
 /// For every place: tells the simulator to put the button there, moves to the start of the trial,
