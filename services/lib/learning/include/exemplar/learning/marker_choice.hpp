@@ -23,7 +23,7 @@ struct MarkerChoiceOptions {
   int points = 240;
   /// Correlations of two subsets that may be computed. Where a rule asks for more, the candidates
   /// of least score are left out, and `warnings` says so.
-  double max_subset_pairs = 300000;
+  double max_subset_pairs = 200000;
   /// Look-ups of correlations that the search for the joint choice may make.
   double max_search_steps = 1e8;
 };
