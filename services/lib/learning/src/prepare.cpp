@@ -35,10 +35,11 @@ struct Smoothed {
 
 // Onto a grid at least as fine as the source, low-pass there, then down to the base.
 Smoothed Smooth(std::vector<double> time_s, Eigen::MatrixXd values, const Base& base,
-                double cutoff_hz) {
+                double cutoff_hz, bool may_be_held = true) {
   Smoothed result;
-  const std::vector<std::size_t> news = signal::FindNews(time_s, values);
-  if (news.size() < time_s.size()) {
+  const std::vector<std::size_t> news =
+      may_be_held ? signal::FindNews(time_s, values) : std::vector<std::size_t>();
+  if (may_be_held && news.size() < time_s.size()) {
     result.repeated = time_s.size() - news.size();
     for (std::size_t k = 0; k < news.size(); ++k) {
       time_s[k] = time_s[news[k]];
@@ -318,7 +319,10 @@ Result<UniformTrial> Prepare(const demonstration::Trial& trial, const LearnOptio
     out.hand_open.assign(open.begin(), open.end());
   }
   if (const std::optional<Force> force = MeasuredForce(trial)) {
-    out.touch_n = Smooth(force->time_s, force->above_rest_n, *base, 0).values.col(0).cwiseMax(0);
+    // Force that rests at one value is not a sample held: nothing is touched.
+    out.touch_n = Smooth(force->time_s, force->above_rest_n, *base, 0, /*may_be_held=*/false)
+                      .values.col(0)
+                      .cwiseMax(0);
   }
   double extent_m = 0;
   if (!out.base_T_tool.empty()) {
