@@ -2,19 +2,22 @@
 
 #include <utility>
 
+#include "executor/realtime.hpp"
+
 namespace exemplar::executor {
 
 namespace {
 constexpr std::uint64_t kEnd = std::uint64_t{1} << 63;
+constexpr int kWritingPriority = 35;
 constexpr Duration kGoodbye = std::chrono::seconds(1);
 }  // namespace
 
 CommandStream::CommandStream(std::unique_ptr<ircp::Writer<ircp::JointCommandSample>> writer,
-                             std::vector<std::string> joint_names, Duration validity)
+                             std::vector<std::string> joint_names, Duration validity, bool realtime)
     : writer_(std::move(writer)),
       joint_names_(std::move(joint_names)),
       validity_(validity),
-      thread_([this] { Run(); }) {}
+      thread_([this, realtime] { Run(realtime); }) {}
 
 CommandStream::~CommandStream() {
   put_.fetch_or(kEnd, std::memory_order_release);
@@ -43,7 +46,8 @@ void CommandStream::Flush() const {
   }
 }
 
-void CommandStream::Run() {
+void CommandStream::Run(bool realtime) {
+  if (realtime) (void)RaisePriority(kWritingPriority);  // the control loop says when it is not
   ircp::JointCommandSample sample;
   sample.names = joint_names_;
   sample.positions.resize(joint_names_.size());

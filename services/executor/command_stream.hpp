@@ -24,9 +24,10 @@ struct Setpoint {
 /// One producer. Put neither allocates nor waits.
 class CommandStream {
  public:
-  /// `validity`: for how long a command stands without another one.
+  /// `validity`: for how long a command stands without another one. `realtime`: the writing thread
+  /// goes before ordinary ones, where this is permitted.
   CommandStream(std::unique_ptr<ircp::Writer<ircp::JointCommandSample>> writer,
-                std::vector<std::string> joint_names, Duration validity);
+                std::vector<std::string> joint_names, Duration validity, bool realtime);
   /// Writes what is left, waits a little for its acknowledgment.
   ~CommandStream();
 
@@ -41,7 +42,7 @@ class CommandStream {
   void Flush() const;
 
  private:
-  void Run();
+  void Run(bool realtime);
 
   static constexpr std::size_t kCapacity = 256;
   std::unique_ptr<ircp::Writer<ircp::JointCommandSample>> writer_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "executor/realtime.hpp"
 #include "exemplar/base/text.hpp"
 
 namespace exemplar::executor {
@@ -12,6 +13,7 @@ namespace {
 
 constexpr const char* kProgram = "executor";
 constexpr double kBeat_s = 0.1;
+constexpr int kControlPriority = 40;
 constexpr Duration kShutdownPatience = std::chrono::seconds(5);
 
 Error Refused(State state, Event event, const std::string& holder) {
@@ -71,8 +73,8 @@ Status Executor::Connect(ircp::Bus& bus) {
   if (!writer.ok()) return writer.error();
   const Duration period = FromSeconds(1 / options_.rate_hz);
   const Duration validity = std::max<Duration>(5 * period, std::chrono::milliseconds(100));
-  commands_ =
-      std::make_unique<CommandStream>(*std::move(writer), robot_.chain.joint_names(), validity);
+  commands_ = std::make_unique<CommandStream>(*std::move(writer), robot_.chain.joint_names(),
+                                              validity, options_.realtime);
   auto control = ircp::ControlServer::Create(
       bus, clock_, kProgram,
       [this](const ircp::CommandSample& command) { return OnCommand(command); });
@@ -458,23 +460,22 @@ Result<api::ExecutionResult> Executor::Execute(
 }
 
 void Executor::ControlLoop(const std::stop_token& stop) {
+  if (options_.realtime && !RaisePriority(kControlPriority)) {
+    log_.Warning("no real-time priority", {{"advice", "CAP_SYS_NICE, or an rtprio limit"}});
+  }
   while (true) {
     std::shared_ptr<MotionRun> run;
     {
       std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop,
-                         [this] { return !run_over_ && state_.load() != State::kReady; })) {
-        return;
-      }
+      if (!changed_.wait(lock, stop, [this] { return !run_over_; })) return;
       run = run_;
     }
-    RunMotion(*run, stop);
-    if (state_.load() == State::kExecuting) (void)Apply(Event::kFinish, "done");
+    if (!RunMotion(*run, stop)) return;
+    // Refused where a stop came first: then the motion ended by that.
+    (void)Apply(Event::kFinish, "the end of the motion is reached");
     {
       const std::lock_guard lock(mutex_);
       run_over_ = true;
-      run_end_ = state_.load();
-      run_detail_ = detail_;
       last_command_ = run->commanded();
     }
     changed_.notify_all();

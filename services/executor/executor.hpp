@@ -29,6 +29,8 @@ namespace exemplar::executor {
 
 struct ExecutorOptions {
   double rate_hz = 125;
+  /// The threads that make and write commands go before ordinary ones, where this is permitted.
+  bool realtime = false;
   /// Older joint states count as none: planning is refused, a motion is stopped.
   Duration state_patience = std::chrono::milliseconds(250);
   /// Objects seen longer ago are not used unless they are asked for with their pose.

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   std::string scene_file;
   std::string learning;
   executor::ExecutorOptions settings;
+  settings.realtime = true;
 
   program::Options options(
       kName, "Executes skills on a robot: inverse kinematics, collision checks, joint commands",
@@ -29,6 +30,8 @@ int main(int argc, char** argv) {
       .Add("--clearance-m", settings.plan.required_clearance_m,
            "room that planned motions keep to everything but what they touch")
       .MinMax(0, 0.5);
+  options.Add("--touch-limit-n", settings.watch.touch_n, "force of a touch that stops a motion")
+      .MinMax(0.1, 10000);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
 
   program::Signals signals;

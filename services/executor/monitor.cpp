@@ -37,9 +37,11 @@ std::optional<std::string> Monitor::Observe(const Measurement& measurement) {
       const double error = (base_T_tool.translation - window.base_p_contact).norm();
       contact_error_m_ = std::min(contact_error_m_.value_or(error), error);
     }
-    if (t >= window.touch_begin_s && t <= window.touch_end_s + kArrival_s) {
-      for (const std::string& link : robot_.touch_links) allowed.push_back({link, window.object});
-    }
+  }
+  for (const motion::TouchWindow& touch : plan_.touches) {
+    if (measurement.path_time_s < touch.begin_s) continue;
+    if (measurement.path_time_s > touch.end_s + kArrival_s) continue;
+    for (const std::string& link : robot_.touch_links) allowed.push_back({link, touch.object});
   }
 
   if (measurement.touch_n > kTouchOnset_n && !touch_onset_s_) {

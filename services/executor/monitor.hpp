@@ -17,7 +17,7 @@ namespace exemplar::executor {
 /// Limits past which an execution is stopped.
 struct WatchLimits {
   double tracking_error_rad = 0.35;  ///< rad or m, of any joint: commanded against measured
-  double touch_n = 80;
+  double touch_n = 120;
   double clearance_m = 0;  ///< of measured states, permitted touches aside
 };
 

@@ -259,6 +259,29 @@ TEST_F(PlanOnArm7, RefusesWhenTheStartItselfIsInAnObstacle) {
   EXPECT_NE(plan.error().message.find("at 0.00 s"), std::string::npos) << plan.error().message;
 }
 
+TEST_F(PlanOnArm7, RisesFromTheLastPressBeforeItGoesElsewhere) {
+  // A first motion that ends in the press.
+  SkillMotion press = MakePress(HomePose(), kTarget);
+  const auto end = static_cast<std::size_t>(press.contacts[0].last);
+  press.time_s.resize(end);
+  press.base_T_tool.resize(end);
+  press.contacts[0].last = static_cast<int>(end) - 1;
+  const Result<PlannedMotion> first = Plan(press);
+  ASSERT_TRUE(first.ok()) << first.error().message;
+  const Eigen::VectorXd pressed = first->trajectory.positions.bottomRows(1).transpose();
+
+  const Result<PlannedMotion> second = Plan(MakePress(HomePose(), kTarget), pressed);
+  ASSERT_TRUE(second.ok()) << second.error().message;
+  ASSERT_EQ(second->touches.size(), 2U);
+  EXPECT_EQ(second->touches[0].begin_s, 0);
+  EXPECT_LT(second->touches[0].end_s, second->report.approach_s);
+  EXPECT_GE(second->report.smallest_clearance.distance_m, options_.required_clearance_m);
+  // Without a contact in the new motion nothing may be touched, not even on the way out.
+  SkillMotion elsewhere = MakePress(HomePose(), kTarget + Eigen::Vector3d(0, 0, 0.1));
+  elsewhere.contacts.clear();
+  EXPECT_FALSE(Plan(elsewhere, pressed).ok());
+}
+
 TEST_F(PlanOnArm7, FollowsAPathWithoutOrientationByPosition) {
   SkillMotion press = MakePress(HomePose(), kTarget);
   press.has_orientation = false;

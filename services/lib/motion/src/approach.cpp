@@ -6,6 +6,7 @@
 
 #include "describe.hpp"
 #include "exemplar/kinematics/inverse_kinematics.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
 #include "timing.hpp"
 #include "trajectory.hpp"
 
@@ -37,25 +38,31 @@ std::optional<Eigen::VectorXd> Raised(const kinematics::Chain& chain,
 
 }  // namespace
 
-Result<JointTrajectory> PlanApproach(const kinematics::RobotModel& model,
-                                     const kinematics::Chain& chain,
-                                     const collision::CollisionChecker& checker,
-                                     const Eigen::Ref<const Eigen::VectorXd>& start,
-                                     const Eigen::Ref<const Eigen::VectorXd>& goal,
-                                     const PlanOptions& options) {
-  if ((start - goal).cwiseAbs().maxCoeff() < kThere_rad) return JointTrajectory{};
-  const auto time = [&](const Way& way) {
+Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinematics::Chain& chain,
+                              const collision::CollisionChecker& checker,
+                              const Eigen::Ref<const Eigen::VectorXd>& start,
+                              const Eigen::Ref<const Eigen::VectorXd>& goal,
+                              const std::vector<collision::AllowedTouch>& touches,
+                              const PlanOptions& options) {
+  if ((start - goal).cwiseAbs().maxCoeff() < kThere_rad) return Approach{};
+  const auto time = [&](const Way& way, std::size_t first, std::size_t last) {
     JointTrajectory all;
-    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
+    for (std::size_t i = first; i < last; ++i) {
       all = Concatenate(all, TimeLine(way[i], way[i + 1], chain.joint_names(), chain.limits(),
                                       options.approach_velocity));
     }
     return all;
   };
-  const auto first_violation = [&](const JointTrajectory& trajectory) {
+  const auto first_violation = [&](const JointTrajectory& trajectory,
+                                   const std::vector<collision::AllowedTouch>& allowed) {
     const TrajectoryPath path(trajectory, model, chain);
-    return checker.FirstViolation(path, 0, trajectory.duration_s(), options.required_clearance_m);
+    return checker.FirstViolation(path, 0, trajectory.duration_s(), options.required_clearance_m,
+                                  allowed);
   };
+  const Eigen::VectorXd all_joints = kinematics::FullJointVector(model, chain, start);
+  const bool touching =
+      checker.SmallestClearance(all_joints).distance_m < options.required_clearance_m &&
+      checker.SmallestClearance(all_joints, touches).distance_m >= options.required_clearance_m;
 
   std::vector<Way> ways;
   for (const double lift : kLifts_m) {
@@ -70,12 +77,22 @@ Result<JointTrajectory> PlanApproach(const kinematics::RobotModel& model,
       }
     }
   }
-  JointTrajectory straight = time({start, goal});
-  const std::optional<collision::Violation> in_the_way = first_violation(straight);
-  if (!in_the_way) return straight;
+  const JointTrajectory straight = time({start, goal}, 0, 1);
+  const std::optional<collision::Violation> in_the_way = first_violation(straight, {});
+  if (!in_the_way) return Approach{straight, 0};
   for (const Way& way : ways) {
-    JointTrajectory trajectory = time(way);
-    if (!first_violation(trajectory)) return trajectory;
+    const std::size_t end = way.size() - 1;
+    if (!touching) {
+      JointTrajectory trajectory = time(way, 0, end);
+      if (!first_violation(trajectory, {})) return Approach{trajectory, 0};
+      continue;
+    }
+    // The first leg leads out of the touch; from its end on nothing is touched any more.
+    const JointTrajectory rise = time(way, 0, 1);
+    const JointTrajectory rest = time(way, 1, end);
+    if (!first_violation(rise, touches) && !first_violation(rest, {})) {
+      return Approach{Concatenate(rise, rest), rise.duration_s()};
+    }
   }
   return FailedPrecondition(
       "no free way from where the robot stands to the motion's first frame; "

@@ -1,18 +1,26 @@
 #pragma once
 // From where the robot stands to a motion's first frame.
 
+#include <vector>
+
 #include "exemplar/collision/scene.hpp"
 #include "exemplar/motion/plan.hpp"
 
 namespace exemplar::motion {
 
+struct Approach {
+  JointTrajectory trajectory;
+  double rise_s = 0;  ///< so long `touches` are in use, from the beginning
+};
+
 /// A collision-free way from rest to rest in joint space: straight, else over one or two raised
-/// postures. Empty when `start` is `goal`. kFailedPrecondition says what is in the way.
-Result<JointTrajectory> PlanApproach(const kinematics::RobotModel& model,
-                                     const kinematics::Chain& chain,
-                                     const collision::CollisionChecker& checker,
-                                     const Eigen::Ref<const Eigen::VectorXd>& start,
-                                     const Eigen::Ref<const Eigen::VectorXd>& goal,
-                                     const PlanOptions& options);
+/// postures. Where the robot begins in a touch of `touches` (the last press), it first rises from
+/// it. Empty when `start` is `goal`. kFailedPrecondition says what is in the way.
+Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinematics::Chain& chain,
+                              const collision::CollisionChecker& checker,
+                              const Eigen::Ref<const Eigen::VectorXd>& start,
+                              const Eigen::Ref<const Eigen::VectorXd>& goal,
+                              const std::vector<collision::AllowedTouch>& touches,
+                              const PlanOptions& options);
 
 }  // namespace exemplar::motion

@@ -272,29 +272,25 @@ std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
   return {*first, *last};
 }
 
-std::vector<ContactWindow> MakeWindows(const SkillMotion& motion, const kinematics::Chain& chain,
-                                       const JointTrajectory& trajectory,
-                                       const PlanOptions& options,
-                                       const std::vector<double>& frame_time_s, double offset_s) {
-  std::vector<ContactWindow> windows;
+void AddContacts(const SkillMotion& motion, const kinematics::Chain& chain,
+                 const PlanOptions& options, const std::vector<double>& frame_time_s,
+                 double offset_s, PlannedMotion& plan) {
   for (const demonstration::Contact& contact : motion.contacts) {
-    ContactWindow window{contact.object, offset_s + frame_time_s[contact.first],
-                         offset_s + frame_time_s[contact.last], contact.base_p_contact};
+    const ContactWindow window{contact.object, offset_s + frame_time_s[contact.first],
+                               offset_s + frame_time_s[contact.last], contact.base_p_contact};
     const auto [begin_s, end_s] =
-        TouchTimes(trajectory, chain, window.begin_s, window.end_s, options.touch_margin_m);
-    window.touch_begin_s = std::max(offset_s, begin_s);
-    window.touch_end_s = end_s;
-    windows.push_back(std::move(window));
+        TouchTimes(plan.trajectory, chain, window.begin_s, window.end_s, options.touch_margin_m);
+    plan.touches.push_back({contact.object, std::max(offset_s, begin_s), end_s});
+    plan.contacts.push_back(window);
   }
-  return windows;
 }
 
-std::vector<Stretch> MakeStretches(const std::vector<ContactWindow>& windows, double duration_s,
+std::vector<Stretch> MakeStretches(const PlannedMotion& plan,
                                    const std::vector<std::string>& touch_links) {
-  std::vector<double> edges = {0, duration_s};
-  for (const ContactWindow& window : windows) {
-    edges.push_back(window.touch_begin_s);
-    edges.push_back(window.touch_end_s);
+  std::vector<double> edges = {0, plan.trajectory.duration_s()};
+  for (const TouchWindow& touch : plan.touches) {
+    edges.push_back(touch.begin_s);
+    edges.push_back(touch.end_s);
   }
   std::sort(edges.begin(), edges.end());
   std::vector<Stretch> stretches;
@@ -302,9 +298,9 @@ std::vector<Stretch> MakeStretches(const std::vector<ContactWindow>& windows, do
     if (edges[i + 1] - edges[i] <= 0) continue;
     Stretch stretch{edges[i], edges[i + 1], {}};
     const double middle = 0.5 * (edges[i] + edges[i + 1]);
-    for (const ContactWindow& window : windows) {
-      if (middle < window.touch_begin_s || middle > window.touch_end_s) continue;
-      for (const std::string& link : touch_links) stretch.allowed.push_back({link, window.object});
+    for (const TouchWindow& touch : plan.touches) {
+      if (middle < touch.begin_s || middle > touch.end_s) continue;
+      for (const std::string& link : touch_links) stretch.allowed.push_back({link, touch.object});
     }
     stretches.push_back(std::move(stretch));
   }
@@ -365,19 +361,28 @@ class Planner {
     std::vector<double> frame_time_s;
     const JointTrajectory skill = TimePath(prepared_.path.time_s, path.joints, chain_.joint_names(),
                                            chain_.limits(), options_.speed_scale, frame_time_s);
-    Result<JointTrajectory> approach = PlanApproach(model_, chain_, checker_, start_,
-                                                    skill.positions.row(0).transpose(), options_);
+    const std::vector<std::string> touch_links = options_.touch_links.empty()
+                                                     ? std::vector<std::string>{chain_.tip_link()}
+                                                     : options_.touch_links;
+    std::vector<collision::AllowedTouch> touches;
+    for (const demonstration::Contact& contact : motion_.contacts) {
+      for (const std::string& link : touch_links) touches.push_back({link, contact.object});
+    }
+    Result<Approach> approach = PlanApproach(model_, chain_, checker_, start_,
+                                             skill.positions.row(0).transpose(), touches, options_);
     if (!approach.ok()) return approach.error();
-    const double offset = approach->duration_s();
-    plan.trajectory = Concatenate(*approach, skill);
+    const double offset = approach->trajectory.duration_s();
+    plan.trajectory = Concatenate(approach->trajectory, skill);
     plan.report.approach_s = offset;
     plan.report.time_stretch = skill.duration_s() / prepared_.path.time_s.back();
 
-    plan.contacts = MakeWindows(motion_, chain_, plan.trajectory, options_, frame_time_s, offset);
-    const std::vector<Stretch> stretches =
-        MakeStretches(plan.contacts, plan.trajectory.duration_s(),
-                      options_.touch_links.empty() ? std::vector<std::string>{chain_.tip_link()}
-                                                   : options_.touch_links);
+    if (approach->rise_s > 0) {
+      for (const demonstration::Contact& contact : motion_.contacts) {
+        plan.touches.push_back({contact.object, 0, approach->rise_s});
+      }
+    }
+    AddContacts(motion_, chain_, options_, frame_time_s, offset, plan);
+    const std::vector<Stretch> stretches = MakeStretches(plan, touch_links);
     const TrajectoryPath swept(plan.trajectory, model_, chain_);
     for (const Stretch& stretch : stretches) {
       const std::optional<collision::Violation> violation = checker_.FirstViolation(

@@ -71,14 +71,20 @@ struct ContactWindow {
   double begin_s = 0;
   double end_s = 0;
   Eigen::Vector3d base_p_contact = Eigen::Vector3d::Zero();
-  /// The contact with its margins: here the touch links may touch the object.
-  double touch_begin_s = 0;
-  double touch_end_s = 0;
+};
+
+/// When the touch links may touch an object: a contact with its margins, or the way out of the
+/// touch in which the motion begins.
+struct TouchWindow {
+  std::string object;
+  double begin_s = 0;
+  double end_s = 0;
 };
 
 struct PlannedMotion {
   JointTrajectory trajectory;
   std::vector<ContactWindow> contacts;
+  std::vector<TouchWindow> touches;
   PlanReport report;
 };
 

@@ -1,0 +1,240 @@
+#pragma once
+// An executor on a network within the process, a robot that does what it is told, and time that
+// moves by hand.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "executor/executor.hpp"
+#include "exemplar/base/clock.hpp"
+#include "exemplar/ircp/memory_bus.hpp"
+
+namespace exemplar::executor::test {
+
+inline const Eigen::Vector3d kTarget(0.6, -0.2, 0.04);
+
+/// A learning service that knows one skill: press the target from above.
+class PressSkill final : public api::SkillApi {
+ public:
+  Result<learning::SkillReport> Learn(const std::string&, const std::map<std::string, std::string>&,
+                                      const learning::Progress&, std::stop_token) override {
+    return Internal("not asked here");
+  }
+  Result<std::vector<api::SkillInfo>> List() override { return std::vector<api::SkillInfo>{}; }
+  Result<learning::SkillReport> Show(const std::string& name, int) override {
+    if (name != "press") return NotFound("no skill \"" + name + "\"", "skill");
+    learning::SkillReport report;
+    report.target = "target";
+    return report;
+  }
+  Result<std::vector<api::VersionInfo>> Versions(const std::string&) override {
+    return std::vector<api::VersionInfo>{};
+  }
+  Status Rollback(const std::string&, int) override { return {}; }
+  Status Delete(const std::string&) override { return {}; }
+  Result<learning::Evaluation> Evaluate(const std::string&, int, const std::string&,
+                                        std::string) override {
+    return Internal("not asked here");
+  }
+  Result<std::string> ExportJson(const std::string&, int) override { return std::string("{}"); }
+
+  Result<demonstration::SkillMotion> Query(const std::string& name, int,
+                                           const demonstration::SkillQuery& query) override {
+    if (error) return *error;
+    if (name != "press") return NotFound("no skill \"" + name + "\"", "skill");
+    last_query = query;
+    demonstration::SkillMotion motion;
+    motion.skill = name;
+    motion.objects = query.objects;
+    const Eigen::Vector3d target = query.objects.front().base_T_object.translation;
+    const Eigen::Vector3d above = target + Eigen::Vector3d(0, 0, 0.08);
+    const Eigen::Vector3d pressed = target - Eigen::Vector3d(0, 0, 0.003);
+    const geometry::Pose start = *query.start;
+    int first = -1;
+    int last = -1;
+    for (int k = 0; k <= 180; ++k) {
+      const double t = k / 60.0;
+      Eigen::Vector3d p = start.translation + Ease(t) * (above - start.translation);
+      p += Ease((t - 1.0) / 0.6) * (pressed - above);
+      p += Ease((t - 2.0) / 0.8) * (above - pressed);
+      motion.time_s.push_back(t);
+      motion.base_T_tool.push_back({p, start.rotation});
+      if (t > 1 && p.z() <= target.z()) {
+        if (first < 0) first = k;
+        last = k;
+      }
+    }
+    motion.contacts.push_back({"target", first, last, target, true});
+    return motion;
+  }
+
+  std::optional<Error> error;
+  std::optional<demonstration::SkillQuery> last_query;
+
+ private:
+  static double Ease(double r) {
+    r = std::clamp(r, 0.0, 1.0);
+    return r * r * r * (10 - 15 * r + 6 * r * r);
+  }
+};
+
+/// The rig of most tests. Time moves only in Step.
+class RobotRig : public ::testing::Test {
+ protected:
+  RobotRig()
+      : robot_(*kinematics::ReadRobotDescription(std::filesystem::path(EXEMPLAR_SOURCE_DIR) /
+                                                 "deploy" / "models" / "arm7")) {
+    measured_ = robot_.home;
+    scene_.obstacles.push_back({"table", geometry::Pose::FromTranslation({0.5, 0, -0.02}),
+                                kinematics::Box{{1.4, 1.4, 0.03}}});
+    scene::Button button;
+    button.name = "target";
+    button.base_T_object.translation = {0.4, 0.3, 0.04};
+    scene_.buttons.push_back(button);
+    executor_ = *Executor::Create(bus_, clock_, log_, skills_, robot_, scene_, ExecutorOptions{});
+    state_writer_ = *bus_.MakeWriter<ircp::JointStateSample>("robot");
+    object_writer_ = *bus_.MakeWriter<ircp::ObjectSample>("vision");
+    safety_writer_ = *bus_.MakeWriter<ircp::SafetySample>("panel");
+    command_reader_ = *bus_.MakeReader<ircp::JointCommandSample>(
+        [this](const ircp::JointCommandSample& sample, const ircp::Reception&) {
+          const std::lock_guard lock(mutex_);
+          commanded_ = Eigen::Map<const Eigen::VectorXd>(
+              sample.positions.data(), static_cast<Eigen::Index>(sample.positions.size()));
+          speed_ =
+              Eigen::Map<const Eigen::VectorXd>(sample.velocities.data(),
+                                                static_cast<Eigen::Index>(sample.velocities.size()))
+                  .norm();
+          ++commands_;
+          heard_.notify_all();
+        });
+    PublishState();
+  }
+
+  void PublishState() {
+    ircp::JointStateSample sample;
+    sample.names = robot_.chain.joint_names();
+    sample.positions.assign(measured_.data(), measured_.data() + measured_.size());
+    sample.touch_sensors = {"finger"};
+    sample.touch_n = {touch_n_};
+    ASSERT_TRUE(state_writer_->Write(sample).ok());
+  }
+
+  void See(const Eigen::Vector3d& position) {
+    ircp::ObjectSample sample;
+    sample.name = "target";
+    sample.frame = "base";
+    sample.base_T_object.translation = position;
+    ASSERT_TRUE(object_writer_->Write(sample).ok());
+  }
+
+  static api::ExecuteRequest Press() {
+    api::ExecuteRequest request;
+    request.skill = "press";
+    request.objects = {{"target", geometry::Pose::FromTranslation(kTarget), true}};
+    return request;
+  }
+
+  /// Starts an execution on a thread of its own.
+  void Begin(const api::ExecuteRequest& request) {
+    over_ = false;
+    execution_ = std::async(std::launch::async, [this, request] {
+      Result<api::ExecutionResult> result = executor_->Execute(
+          request,
+          [this](const api::ExecutionFeedback& now) {
+            const std::lock_guard lock(mutex_);
+            feedback_.push_back(now);
+          },
+          stop_.get_token());
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+      heard_.notify_all();
+      return result;
+    });
+    Await([this] { return commands_ > 0 || over_; });
+  }
+
+  /// One cycle: time moves on, the executor commands, the robot is there (but for `lag_`).
+  void Step() {
+    std::uint64_t before = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      before = commands_;
+    }
+    clock_.Advance(std::chrono::milliseconds(8));
+    Await([&] { return commands_ > before || over_; });
+    {
+      const std::lock_guard lock(mutex_);
+      if (follows_ && commanded_.size() > 0) {
+        measured_ = commanded_;
+        measured_[1] += lag_rad_;
+      }
+    }
+    if (speaks_) PublishState();
+  }
+
+  void Steps(int count) {
+    for (int i = 0; i < count && !over(); ++i) Step();
+  }
+
+  Result<api::ExecutionResult> Finish() {
+    for (int i = 0; i < 5000 && !over(); ++i) Step();
+    EXPECT_TRUE(over());
+    return execution_.get();
+  }
+
+  bool over() {
+    const std::lock_guard lock(mutex_);
+    return over_;
+  }
+
+  std::string state() { return executor_->GetStatus()->state; }
+
+  double speed() {
+    const std::lock_guard lock(mutex_);
+    return speed_;
+  }
+
+  template <class Condition>
+  void Await(Condition condition) {
+    std::unique_lock lock(mutex_);
+    ASSERT_TRUE(heard_.wait_for(lock, std::chrono::seconds(30), condition));
+  }
+
+  kinematics::RobotDescription robot_;
+  scene::Description scene_;
+  ManualClock clock_;
+  NullLog log_;
+  ircp::MemoryBus bus_{clock_};
+  PressSkill skills_;
+  std::unique_ptr<Executor> executor_;
+  std::unique_ptr<ircp::Writer<ircp::JointStateSample>> state_writer_;
+  std::unique_ptr<ircp::Writer<ircp::ObjectSample>> object_writer_;
+  std::unique_ptr<ircp::Writer<ircp::SafetySample>> safety_writer_;
+  std::unique_ptr<ircp::Reader> command_reader_;
+  std::stop_source stop_;
+  std::future<Result<api::ExecutionResult>> execution_;
+
+  Eigen::VectorXd measured_;
+  double touch_n_ = 0;
+  double lag_rad_ = 0;
+  bool follows_ = true;
+  bool speaks_ = true;
+
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  Eigen::VectorXd commanded_;
+  double speed_ = 0;
+  std::uint64_t commands_ = 0;
+  std::vector<api::ExecutionFeedback> feedback_;
+  bool over_ = false;
+};
+
+}  // namespace exemplar::executor::test
