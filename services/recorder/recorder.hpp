@@ -27,7 +27,7 @@ struct RecorderOptions {
   /// Stop() waits this long at the most for what writers have announced but is still on its way.
   Duration settle_time = std::chrono::milliseconds(500);
   recording::WriterOptions file = {};
-  /// Told of each change of state, never with a lock held; must not call the recorder.
+  /// Told of each change of state; may ask the recorder for its status and nothing else.
   std::function<void(const std::string& state, const std::string& detail)> on_change =
       [](const std::string&, const std::string&) {};
 };

@@ -10,11 +10,11 @@
 #include <mutex>
 
 #include "cdr.hpp"
-#include "eventually.hpp"
 #include "exemplar/base/rng.hpp"
 #include "exemplar/recording/file.hpp"
 #include "exemplar/recording/recover.hpp"
 #include "recorder/control_commands.hpp"
+#include "support/eventually.hpp"
 
 namespace exemplar::recorder {
 namespace {
