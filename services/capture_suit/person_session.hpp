@@ -19,9 +19,9 @@
 namespace exemplar::capture_suit {
 
 struct PersonSessionOptions {
-  std::string object;                   ///< the button to press; empty: the scene's first
-  std::string places;                   ///< as ParsePlaces reads them; empty: where the button is
-  std::string name;                     ///< of the recordings
+  std::string object = {};              ///< the button to press; empty: the scene's first
+  std::string places = {};              ///< as ParsePlaces reads them; empty: where the button is
+  std::string name = {};                ///< of the recordings
   bool record = false;                  ///< tell the recorder
   bool place_only = false;              ///< put the button at each place and press nothing
   double press_depth_m = 0;             ///< 0: the button's travel and a little more

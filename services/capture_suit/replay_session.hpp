@@ -20,7 +20,7 @@ namespace exemplar::capture_suit {
 struct ReplayOptions {
   double rate = 1;             ///< so many times faster than recorded
   bool record = false;         ///< tell the recorder to start and stop around each trial
-  std::string name;            ///< of the recordings
+  std::string name = {};       ///< of the recordings
   std::string frame = "base";  ///< the frame of the files' poses
   std::uint64_t seed = 1;      ///< of request ids
 };
