@@ -15,8 +15,12 @@ constexpr double kObjectGain = 1e5;
 // The best gains are averaged with shares that fall with this power of their left-out score.
 constexpr std::size_t kMembers = 8;
 constexpr double kSharpness = 16;
-// Gains are chosen on at most this many trials; the answer uses all.
+// Gains are chosen on at most this many trials and frames; the answer uses all. Many trials leave
+// less to choose.
 constexpr int kMostForChoice = 40;
+constexpr Eigen::Index kFramesForChoice = 150;
+constexpr int kManyTrials = 30;
+constexpr std::size_t kMembersOfMany = 2;
 
 std::vector<FrameGains> Grid(bool turns) {
   std::vector<FrameGains> grid;
@@ -148,7 +152,8 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
-  if (candidates.size() > kMembers) candidates.resize(kMembers);
+  const std::size_t members = n > kManyTrials ? kMembersOfMany : kMembers;
+  if (candidates.size() > members) candidates.resize(members);
   double total = 0;
   for (const Candidate& candidate : candidates) {
     const double ratio = candidate.score > 0 ? candidates.front().score / candidate.score : 1.0;
