@@ -8,6 +8,7 @@
 #include <string>
 
 #include "simulator/mjcf_writer.hpp"
+#include "simulator/mujoco_rows.hpp"
 
 namespace exemplar::simulator {
 namespace {
@@ -116,9 +117,9 @@ struct Renderer::Impl {
   void Pose(const Snapshot& snapshot) {
     std::copy(snapshot.positions.begin(), snapshot.positions.end(), data->qpos);
     for (int i = 0; i < model->nmocap; ++i) {
-      const double* pose = snapshot.thing_poses.data() + 7 * i;
-      std::copy_n(pose, 3, data->mocap_pos + 3 * i);
-      std::copy_n(pose + 3, 4, data->mocap_quat + 4 * i);
+      const double* pose = Row(snapshot.thing_poses.data(), 7, i);
+      std::copy_n(pose, 3, Row(data->mocap_pos, 3, i));
+      std::copy_n(pose + 3, 4, Row(data->mocap_quat, 4, i));
     }
     mj_kinematics(model.get(), data.get());
     mj_comPos(model.get(), data.get());

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "simulator/mjcf_writer.hpp"
+#include "simulator/mujoco_rows.hpp"
 
 namespace exemplar::simulator {
 namespace {
@@ -53,8 +54,8 @@ int BodyId(const mjModel& model, const std::string& name) {
 }
 
 geometry::Pose BodyPose(const mjData& data, int body) {
-  const mjtNum* p = data.xpos + 3 * body;
-  const mjtNum* q = data.xquat + 4 * body;
+  const mjtNum* p = Row(data.xpos, 3, body);
+  const mjtNum* q = Row(data.xquat, 4, body);
   return {{p[0], p[1], p[2]}, Eigen::Quaterniond(q[0], q[1], q[2], q[3])};
 }
 
@@ -90,8 +91,8 @@ Drive MakeDrive(const mjModel& model, const kinematics::Joint& joint) {
           .dof = model.jnt_dofadr[id],
           .actuator = actuator,
           .effort = joint.limits.effort,
-          .stiffness = model.actuator_gainprm[mjNGAIN * actuator],
-          .damping = -model.actuator_biasprm[mjNBIAS * actuator + 2]};
+          .stiffness = Row(model.actuator_gainprm, mjNGAIN, actuator)[0],
+          .damping = -Row(model.actuator_biasprm, mjNBIAS, actuator)[2]};
 }
 
 }  // namespace
@@ -187,8 +188,9 @@ struct World::Impl {
     for (const Drive& drive : drives) {
       const double bias = data->qfrc_bias[drive.dof];
       data->qfrc_applied[drive.dof] = bias;
-      model->actuator_forcerange[2 * drive.actuator] = -drive.effort - bias;
-      model->actuator_forcerange[2 * drive.actuator + 1] = drive.effort - bias;
+      mjtNum* range = Row(model->actuator_forcerange, 2, drive.actuator);
+      range[0] = -drive.effort - bias;
+      range[1] = drive.effort - bias;
     }
   }
 
@@ -354,8 +356,8 @@ Status World::Place(std::string_view thing, const geometry::Pose& base_T_thing) 
   const int body = BodyId(*w.model, ThingBody(std::string(thing)));
   if (body < 0) return NoSuchThing(thing);
   const int mocap = w.model->body_mocapid[body];
-  mjtNum* position = w.data->mocap_pos + 3 * mocap;
-  mjtNum* rotation = w.data->mocap_quat + 4 * mocap;
+  mjtNum* position = Row(w.data->mocap_pos, 3, mocap);
+  mjtNum* rotation = Row(w.data->mocap_quat, 4, mocap);
   mjtNum before[7];
   std::copy_n(position, 3, before);
   std::copy_n(rotation, 4, before + 3);
@@ -395,10 +397,10 @@ Snapshot World::snapshot() const {
   snapshot.time = time();
   snapshot.positions.assign(data.qpos, data.qpos + model.nq);
   for (int i = 0; i < model.nmocap; ++i) {
-    snapshot.thing_poses.insert(snapshot.thing_poses.end(), data.mocap_pos + 3 * i,
-                                data.mocap_pos + 3 * i + 3);
-    snapshot.thing_poses.insert(snapshot.thing_poses.end(), data.mocap_quat + 4 * i,
-                                data.mocap_quat + 4 * i + 4);
+    const mjtNum* position = Row(data.mocap_pos, 3, i);
+    const mjtNum* rotation = Row(data.mocap_quat, 4, i);
+    snapshot.thing_poses.insert(snapshot.thing_poses.end(), position, position + 3);
+    snapshot.thing_poses.insert(snapshot.thing_poses.end(), rotation, rotation + 4);
   }
   return snapshot;
 }

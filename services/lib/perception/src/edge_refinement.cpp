@@ -23,7 +23,7 @@ std::optional<double> EdgeOffset(const GreyView& picture, const Eigen::Vector2d&
   constexpr double kStep = 0.25;
   const int half = static_cast<int>(std::floor(reach / kStep));
   std::vector<double> profile;
-  profile.reserve(static_cast<std::size_t>(2 * half + 1));
+  profile.reserve(2 * static_cast<std::size_t>(half) + 1);
   for (int i = -half; i <= half; ++i) profile.push_back(picture.At(middle + i * kStep * normal));
   // The levels are those of the outer quarters, where the edge is not.
   const std::size_t quarter = std::max<std::size_t>(1, profile.size() / 5);
@@ -76,6 +76,7 @@ std::optional<Line> EdgeLine(const GreyView& picture, int cells, const Eigen::Ve
   const double margin = std::min(0.25, 1.2 * reach / length);
   const int samples = std::max(8, static_cast<int>(2 * length * (1 - 2 * margin)));
   std::vector<Eigen::Vector2d> points;
+  points.reserve(static_cast<std::size_t>(samples));
   for (int i = 0; i < samples; ++i) {
     const double s = margin + (1 - 2 * margin) * (i + 0.5) / samples;
     const Eigen::Vector2d middle = from + s * way;
@@ -87,6 +88,7 @@ std::optional<Line> EdgeLine(const GreyView& picture, int cells, const Eigen::Ve
   Line line = FitLine(points);
   // Once more without what does not lie on it (something in front of the marker).
   std::vector<double> distances;
+  distances.reserve(points.size());
   for (const Eigen::Vector2d& p : points) distances.push_back(Distance(line, p));
   std::vector<double> sorted = distances;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
