@@ -333,7 +333,8 @@ Result<std::string> ReadIndexed(recording::ByteSource& source) {
 Result<std::string> NormalisedRecords(const std::string& json) {
   try {
     std::string lines;
-    for (const ordered_json& record : ordered_json::parse(json).at("records")) {
+    const ordered_json document = ordered_json::parse(json);
+    for (const ordered_json& record : document.at("records")) {
       lines += record.at("type").get<std::string>();
       for (const auto& [name, value] : FieldsOf(record)) lines += " " + name + "=" + value.dump();
       lines += "\n";

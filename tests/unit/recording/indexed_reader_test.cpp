@@ -105,7 +105,7 @@ TEST(IndexedReader, SurvivesNoiseEverywhere) {
   ReaderOptions options;
   options.check_crcs = false;
   options.largest_record_bytes = 1u << 16;
-  for (int i = 0; i < 3000; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     Bytes bad = sample.file;
     for (int flips = 0; flips < 2; ++flips) {
       bad[rng.Below(bad.size())] = static_cast<std::uint8_t>(rng.Below(256));

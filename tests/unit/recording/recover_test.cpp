@@ -137,7 +137,7 @@ TEST(Recover, SurvivesNoiseEverywhere) {
   Rng rng(35);
   const SampleRecording sample =
       MakeRecording(rng, 40, {.chunk_bytes = 500, .compression = Compression::kLz4});
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 500; ++i) {
     Bytes bad = sample.file;
     for (int flips = 0; flips < 3; ++flips) {
       bad[sizeof kMagic + rng.Below(bad.size() - sizeof kMagic)] =
