@@ -17,7 +17,7 @@ struct Recovered {
 Recovered MustRecover(ByteView damaged) {
   MemorySource source(damaged);
   MemorySink sink;
-  Result<RecoveryReport> report = Recover(source, sink);
+  Result<RecoveryReport> report = Recover(source, sink, {.compression = Compression::kNone});
   EXPECT_TRUE(report.ok()) << report.error().message;
   if (!report.ok()) return {};
   const Result<std::vector<Record>> records = ReadAll(sink.bytes());
