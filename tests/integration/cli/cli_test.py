@@ -253,7 +253,7 @@ class ServiceTest(unittest.TestCase):
         self.assertEqual(len(self.json("trial", "list", "--skill", "mixed")), 1)
 
     def test_learning_tells_progress_and_ends_with_a_report(self):
-        self.assertIn("reading the trials\n", self.learned.stderr)
+        self.assertIn("storing the skill\n", self.learned.stderr)
         self.assertNotIn("\r", self.learned.stderr)
         for words in ("skill press, version", "press0.csv", "correlation", "before alignment", "contact", "METHOD", "FRECHET"):
             self.assertIn(words, self.learned.stdout)
