@@ -18,6 +18,7 @@ constexpr Duration kStatusPeriod = std::chrono::seconds(1);
 struct Received {
   CommandSample command;
   Duration at{0};
+  std::optional<Answer> answer;  ///< known already: only to be given (again)
 };
 
 class Server final : public ControlServer {
@@ -69,28 +70,26 @@ class Server final : public ControlServer {
   }
 
  private:
-  /// On a thread of the network.
+  /// On a thread of the network: only hands over.
   void Take(const CommandSample& command) {
     if (command.program != program_) return;
-    std::optional<Answer> again;
+    Received received{.command = command, .at = clock_.Steady(), .answer = {}};
     {
       const std::lock_guard lock(mutex_);
       if (const auto known = answers_.find(command.request_id); known != answers_.end()) {
-        again = known->second;
-      } else if (!waiting_.insert(command.request_id).second) {
+        received.answer = known->second;
+      } else if (waiting_.count(command.request_id) != 0) {
         return;
       } else if (queue_.size() >= kLongestQueue) {
-        waiting_.erase(command.request_id);
-        again = Answer{false, program_ + " has too many commands waiting", {}};
+        received.answer = Answer{false, program_ + " has too many commands waiting", {}};
       } else {
-        queue_.push_back({command, clock_.Steady()});
+        waiting_.insert(command.request_id);
       }
+      // The asker repeats: what does not even find room for a refusal comes again.
+      if (queue_.size() >= 2 * kLongestQueue) return;
+      queue_.push_back(std::move(received));
     }
-    if (again) {
-      Publish(command.request_id, *again);
-    } else {
-      arrived_.notify_one();
-    }
+    arrived_.notify_one();
   }
 
   void Work(const std::stop_token& stop) {
@@ -101,18 +100,21 @@ class Server final : public ControlServer {
       queue_.pop_front();
       lock.unlock();
 
-      const Answer answer = Handle(next);
+      const std::string& id = next.command.request_id;
+      const Answer answer = next.answer ? *next.answer : Handle(next);
+      if (!next.answer) Remember(id, answer);
+      Publish(id, answer);
+    }
+  }
 
-      lock.lock();
-      waiting_.erase(next.command.request_id);
-      answers_[next.command.request_id] = answer;
-      answered_order_.push_back(next.command.request_id);
-      if (answered_order_.size() > kAnswersKept) {
-        answers_.erase(answered_order_.front());
-        answered_order_.pop_front();
-      }
-      lock.unlock();
-      Publish(next.command.request_id, answer);
+  void Remember(const std::string& id, const Answer& answer) {
+    const std::lock_guard lock(mutex_);
+    waiting_.erase(id);
+    answers_[id] = answer;
+    answered_order_.push_back(id);
+    if (answered_order_.size() > kAnswersKept) {
+      answers_.erase(answered_order_.front());
+      answered_order_.pop_front();
     }
   }
 

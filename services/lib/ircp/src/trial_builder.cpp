@@ -40,6 +40,14 @@ std::string Named(const std::string& stream, const std::string& name) {
 
 }  // namespace
 
+TrialBuilder::Poses& TrialBuilder::FindOrAdd(std::map<std::string, Poses>& named,
+                                             const std::string& name) {
+  const std::size_t order = named.size();
+  const auto [entry, added] = named.try_emplace(name);
+  if (added) entry->second.order = order;
+  return entry->second;
+}
+
 void TrialBuilder::Gather(std::map<std::string, Rows>& senders, const Header& header,
                           const std::vector<std::string>& names, const Row& values) {
   Rows& sender = senders[header.source];
@@ -67,7 +75,7 @@ void TrialBuilder::Add(const JointStateSample& sample) {
 }
 
 void TrialBuilder::Add(const EndEffectorSample& sample) {
-  Poses& hand = hands_[sample.hand];
+  Poses& hand = FindOrAdd(hands_, sample.hand);
   hand.has_orientation = hand.has_orientation && sample.has_orientation;
   hand.poses.emplace_back(sample.header.stamp, sample.base_T_tool);
   if (sample.has_hand_open) {
@@ -86,7 +94,7 @@ void TrialBuilder::Add(const EndEffectorSample& sample) {
 }
 
 void TrialBuilder::Add(const ObjectSample& sample) {
-  Poses& object = objects_[sample.name];
+  Poses& object = FindOrAdd(objects_, sample.name);
   object.has_orientation = object.has_orientation && sample.has_orientation;
   object.poses.emplace_back(sample.header.stamp, sample.base_T_object);
 }
@@ -94,16 +102,16 @@ void TrialBuilder::Add(const ObjectSample& sample) {
 Result<Trial> TrialBuilder::Build(std::string source) const {
   Trial trial;
   trial.source = std::move(source);
-  const bool from_robot = suits_.empty();
+  const bool from_robot = suits_.empty() && hands_.empty();
   const std::map<std::string, Rows>& joints = from_robot ? states_ : suits_;
-  const std::map<std::string, Rows>& touch = tactile_.empty() ? touches_ : tactile_;
+  const std::map<std::string, Rows>& touch = from_robot && tactile_.empty() ? touches_ : tactile_;
   if (joints.empty() && hands_.empty()) {
     return InvalidArgument(trial.source +
                            ": holds neither joints (ircp/suit) nor tool poses (ircp/end_effector)");
   }
   if (from_robot && !joints.empty()) {
     trial.notices.emplace_back(
-        "joints are the robot's own (ircp/joint_state): no suit was recorded");
+        "joints are the robot's own (ircp/joint_state): neither suit nor tool was recorded");
   }
 
   Stamp start = Stamp::FromNanoseconds(std::numeric_limits<std::int64_t>::max());
@@ -166,11 +174,13 @@ Result<Trial> TrialBuilder::Build(std::string source) const {
 
   trial.joints = only(joints, "joints");
   trial.tactile = only(touch, "tactile");
+  trial.end_effectors.resize(hands_.size());
   for (const auto& [name, hand] : hands_) {
-    trial.end_effectors.push_back(poses(hand, name, "end effector"));
+    trial.end_effectors[hand.order] = poses(hand, name, "end effector");
   }
+  trial.objects.resize(objects_.size());
   for (const auto& [name, object] : objects_) {
-    trial.objects.push_back(poses(object, name, "object"));
+    trial.objects[object.order] = poses(object, name, "object");
   }
   if (!wrench_.rows.empty()) trial.wrench = scalars(wrench_, "wrench");
   if (!label_.rows.empty()) trial.label = scalars(label_, "label");

@@ -13,8 +13,10 @@
 
 namespace exemplar::ircp {
 
-/// Gathers one trial's samples, in any order. Joints come from ircp/suit; where there are none,
-/// from ircp/joint_state (and touch likewise from ircp/tactile, else from there).
+/// Gathers one trial's samples, in any order. Joints come from ircp/suit and touch from
+/// ircp/tactile. Only where the recording holds neither a suit nor a tool pose was a robot itself
+/// the demonstrator: then joints, and touch if there is no other, come from ircp/joint_state (else
+/// the robot merely stood by). Hands and objects keep the order in which they were first seen.
 /// Thread-compatible.
 class TrialBuilder {
  public:
@@ -38,10 +40,12 @@ class TrialBuilder {
     int other_names = 0;  ///< samples left out because their names differ
   };
   struct Poses {
+    std::size_t order = 0;  ///< how many others were seen first
     std::vector<std::pair<Stamp, geometry::Pose>> poses;
     bool has_orientation = true;
   };
 
+  static Poses& FindOrAdd(std::map<std::string, Poses>& named, const std::string& name);
   static void Gather(std::map<std::string, Rows>& senders, const Header& header,
                      const std::vector<std::string>& names, const Row& values);
 
