@@ -29,7 +29,7 @@ int Submit(const Session& session, const SubmitWords& words) {
         file ? clients->trials->Submit(words.skill, FileName(path), *std::move(file))
              : Result<api::SubmitResult>(file.error());
     if (!result) {
-      const int failed = Fail(file ? WithPlace(result.error(), path) : result.error());
+      const int failed = Fail(result.error());
       if (code == 0) code = failed;
       // The others would fail alike.
       if (result.error().code == ErrorCode::kUnavailable) break;

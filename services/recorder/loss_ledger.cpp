@@ -132,8 +132,7 @@ std::vector<api::TopicFigures> LossLedger::TopicFigures(Duration steady_now) con
       const WriterFigures w = FiguresOf(name, id, writer);
       figures.received += w.received;
       figures.lost += w.lost();
-      // A writer may have gone on since it last announced.
-      figures.sent += w.announced ? std::max(*w.announced, w.last) : w.received + w.lost();
+      figures.sent += w.sent();
     }
     const Duration elapsed = steady_now - topic.window_start;
     figures.rate_hz = elapsed < kRateWindow ? topic.rate_hz

@@ -26,6 +26,8 @@ struct WriterFigures {
   std::optional<std::uint64_t> announced;  ///< the last number it said to have sent
 
   std::uint64_t lost() const { return lost_in_gaps + lost_at_end + dropped; }
+  /// Since the first one that came, as far as the writer has told.
+  std::uint64_t sent() const { return received + lost(); }
 };
 
 /// What happened between two looks at the same ledger.

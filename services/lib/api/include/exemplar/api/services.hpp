@@ -203,7 +203,7 @@ struct RecordStart {
 struct TopicFigures {
   std::string topic;
   std::string type;
-  std::uint64_t sent = 0;  ///< as the writers announced; received + lost where none did
+  std::uint64_t sent = 0;  ///< since the first one that came, up to the last announced one
   std::uint64_t received = 0;
   std::uint64_t lost = 0;
   double rate_hz = 0;
