@@ -84,6 +84,17 @@ Status Executor::Connect(ircp::Bus& bus) {
     return std::vector<ircp::TopicCount>{
         {ircp::JointCommandSample::kTopic, kProgram, commands_->sent()}};
   });
+  control_->SetValues([this] {
+    std::map<std::string, std::string> values = {{"speed", FormatDouble(speed_.load())}};
+    const std::lock_guard lock(mutex_);
+    if (run_ != nullptr && !run_over_) {
+      values["time_s"] = FormatFixed(run_->path_time_s(), 3);
+      values["duration_s"] = FormatFixed(run_->duration_s(), 3);
+      values["tracking_error_rad"] = FormatFixed(run_->tracking_error_rad(), 4);
+      values["touch_n"] = FormatFixed(run_->touch_n(), 2);
+    }
+    return values;
+  });
   control_->SetState(std::string(ToString(State::kIdle)), "");
 
   control_thread_ = std::jthread([this](const std::stop_token& stop) { ControlLoop(stop); });
@@ -267,15 +278,15 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
 Result<Eigen::VectorXd> Executor::StartJoints() const {
   const std::optional<Duration> age = StateAge();
   const std::optional<MeasuredState> measured = view_.latest();
+  const std::string problem = view_.problem();
+  const std::string why = problem.empty() ? "" : ": " + problem;
   if (!age || !measured) {
-    const std::string problem = view_.problem();
-    return Unavailable("nothing usable was heard from the robot on ircp/joint_state" +
-                       (problem.empty() ? "" : ": " + problem));
+    return Unavailable("nothing usable was heard from the robot on ircp/joint_state" + why);
   }
   if (*age > options_.state_patience) {
-    return Unavailable("the robot's last joint state is " + FormatFixed(ToSeconds(*age), 2) +
+    return Unavailable("the robot's last usable joint state is " + FormatFixed(ToSeconds(*age), 2) +
                        " s old, " + FormatFixed(ToSeconds(options_.state_patience), 2) +
-                       " s allowed");
+                       " s allowed" + why);
   }
   const std::lock_guard lock(mutex_);
   if (last_command_ &&
@@ -471,6 +482,7 @@ void Executor::ControlLoop(const std::stop_token& stop) {
       run = run_;
     }
     if (!RunMotion(*run, stop)) return;
+    commands_->Flush();  // so that the status that follows counts every command
     // Refused where a stop came first: then the motion ended by that.
     (void)Apply(Event::kFinish, "the end of the motion is reached");
     {
