@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/learning/inspection.hpp"
 
 namespace exemplar::learning_service {
 namespace {
@@ -259,8 +260,9 @@ Result<learning::Evaluation> Skills::Evaluate(const std::string& name, int versi
 Result<std::string> Skills::ExportJson(const std::string& name, int version) {
   const Result<learning::Skill> skill = Find(name, version);
   if (!skill) return skill.error();
-  return learning::ToJson(*skill).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
-         "\n";
+  nlohmann::json document = learning::ToJson(*skill);
+  document["inspection"] = learning::ToJson(learning::Inspect(*skill));
+  return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace exemplar::learning_service

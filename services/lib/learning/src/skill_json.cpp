@@ -4,6 +4,7 @@
 #include <string>
 
 #include "exemplar/learning/skill.hpp"
+#include "json_values.hpp"
 #include "skill_data.hpp"
 
 // Doubles are written with enough digits to read back the same, and everything else follows from
@@ -15,61 +16,6 @@ namespace {
 using nlohmann::json;
 
 constexpr int kFormat = 1;
-
-// ---- values of other libraries ------------------------------------------------------------------
-
-json FromVector(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
-
-Eigen::VectorXd ToVector(const json& j) {
-  const auto values = j.get<std::vector<double>>();
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-json FromMatrix(const Eigen::MatrixXd& m) {
-  return {{"rows", m.rows()},
-          {"cols", m.cols()},
-          {"values", std::vector<double>(m.data(), m.data() + m.size())}};
-}
-
-Eigen::MatrixXd ToMatrix(const json& j) {
-  const auto rows = j.at("rows").get<Eigen::Index>();
-  const auto cols = j.at("cols").get<Eigen::Index>();
-  const auto values = j.at("values").get<std::vector<double>>();
-  if (rows < 0 || cols < 0 || static_cast<std::size_t>(rows * cols) != values.size()) {
-    throw json::other_error::create(501, "matrix size does not fit its values", &j);
-  }
-  return Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
-}
-
-json FromPose(const geometry::Pose& pose) {
-  const Eigen::Vector3d& p = pose.translation;
-  const Eigen::Quaterniond& q = pose.rotation;
-  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
-}
-
-geometry::Pose ToPose(const json& j) {
-  const auto v = j.get<std::array<double, 7>>();
-  return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Quaterniond(v[6], v[3], v[4], v[5])};
-}
-
-json FromPoses(const std::vector<geometry::Pose>& poses) {
-  json flat = json::array();
-  for (const geometry::Pose& pose : poses) {
-    for (const json& value : FromPose(pose)) flat.push_back(value);
-  }
-  return flat;
-}
-
-std::vector<geometry::Pose> ToPoses(const json& j) {
-  const auto v = j.get<std::vector<double>>();
-  if (v.size() % 7 != 0) throw json::other_error::create(501, "poses need 7 values each", &j);
-  std::vector<geometry::Pose> poses;
-  for (std::size_t i = 0; i < v.size(); i += 7) {
-    poses.push_back({Eigen::Vector3d(v[i], v[i + 1], v[i + 2]),
-                     Eigen::Quaterniond(v[i + 6], v[i + 3], v[i + 4], v[i + 5])});
-  }
-  return poses;
-}
 
 // ---- alignment ----------------------------------------------------------------------------------
 
