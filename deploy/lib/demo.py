@@ -98,9 +98,12 @@ class Demo:
             for notice in trial.get("notices", []):
                 self.say.detail(f"{trial.get('source', trial.get('id'))}: {notice}")
         self.say.step("learning")
-        report = self.system.cli(self.learning, "skill", "learn", SKILL)
+        self.system.cli(self.learning, "skill", "learn", SKILL)
         self.say.detail(self.system.cli(self.learning, "skill", "show", SKILL, "--format", "text", as_json=False))
-        return len(submitted), report
+        return len(submitted)
+
+    def skill(self):
+        return json.loads(self.system.cli(self.learning, "skill", "export", SKILL, as_json=False))
 
     def start_robot(self, scene, *simulator_options):
         self.simulator = self.system.start("simulator", "--robot", self.robot, "--scene", scene, *simulator_options)
@@ -211,7 +214,7 @@ class Demo:
                 "capture-suit", "--replay", file, "--rate", rate, "--record", "--name", f"trial-{number:03}"
             )
             capture.wait(total_s / rate + 60)
-        trials, report = self.submit_and_learn()
+        trials = self.submit_and_learn()
 
         self.say.step(f"querying at the object pose and start of {left_out.name}")
         evaluation = self.system.cli(self.learning, "skill", "evaluate", SKILL, left_out)
@@ -227,7 +230,7 @@ class Demo:
         query = evaluation["query"]
         objects = [part for pose in query["objects"] for part in ("--object", pose["name"] + "=" + numbers(pose))]
         execution = self.execute(*objects, "--start", numbers(query["start"]))
-        picture.draw(self.options.keep / "result.svg", left_out.name, answer, execution, left_out, learn)
+        picture.draw(self.options.keep / "result.svg", left_out.name, answer, execution, left_out, self.skill())
         self.report(self.figures(trials, evaluation, execution))
 
     # ---- the simulated person ----
@@ -246,7 +249,7 @@ class Demo:
         )  # fmt: skip
         person.wait(240)
         self.say.detail("\n".join(line for line in person.log.read_text().splitlines() if "trial" in line))
-        trials, report = self.submit_and_learn()
+        trials = self.submit_and_learn()
 
         self.say.step("the button is moved to a place that no trial had")
         self.simulator.stop()
@@ -262,7 +265,7 @@ class Demo:
         answer = self.system.cli(self.learning, "skill", "query", SKILL, "--object", "target=" + numbers(seen))
         execution = self.execute("--object", "target=" + numbers(seen))
         clicks = wait_until("the simulator's count of clicks", self.clicks, 5)
-        picture.draw(self.options.keep / "result.svg", "a place no trial had", answer, execution, None, [])
+        picture.draw(self.options.keep / "result.svg", "a place no trial had", answer, execution, None, self.skill())
         missed = [] if clicks > 0 else ["the button did not click"]
         self.report(self.figures(trials, None, execution, missed, clicks=clicks))
 

@@ -92,9 +92,16 @@ def path_of_trial(file):
     return points
 
 
-def draw(target, title, answer, execution, left_out, learned):
-    """`answer`: a skill's motion, `execution`: an execution's result, both as the command line prints them."""
-    paths = [(path_of_trial(file), TRIAL, 1.2, "", "trials learned from") for file in learned]
+def paths_of_skill(skill):
+    """Tool positions of the trials that a skill was learned from, of its exported document."""
+    poses = [trial["own"]["base_T_tool"] for trial in skill["alignment"]["trials"]]  # x y z qx qy qz qw, ...
+    return [list(zip(flat[0::7], flat[1::7], flat[2::7])) for flat in poses]
+
+
+def draw(target, title, answer, execution, left_out, skill):
+    """`answer`: a skill's motion, `execution`: an execution's result, both as the command line prints them;
+    `skill`: its export; `left_out`: the file of the trial that the answer should be like, or None."""
+    paths = [(path, TRIAL, 1.2, "", "trials learned from") for path in paths_of_skill(skill)]
     if left_out:
         paths.append((path_of_trial(left_out), PERSON, 2, "", "what the person did here (left out)"))
     paths.append(([tuple(p["position"]) for p in answer["base_T_tool"]], ANSWER, 2.2, "", "the skill's answer"))
