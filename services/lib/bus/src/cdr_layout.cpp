@@ -1,5 +1,6 @@
 #include "cdr_layout.hpp"
 
+#include <cstring>
 #include <string>
 
 namespace exemplar::bus {
@@ -49,9 +50,24 @@ class Walker {
         return Skip(4, 4);
       case 'b':
         return Skip(1, 1);
+      case 's':
+        return TakeString();
       default:
         return Skip(1, TakeLength());
     }
+  }
+
+  /// Ends with its only NUL; a length of 0 stands for the empty string with some writers.
+  void TakeString() {
+    const std::uint32_t length = TakeLength();
+    Skip(1, length);
+    if (!status_.ok() || length == 0) return;
+    const std::uint8_t* text = body_.data() + position_ - length;
+    const void* first_nul = std::memchr(text, 0, length);
+    if (first_nul == text + length - 1) return;
+    status_ = Error{ErrorCode::kDataLoss,
+                    "byte " + std::to_string(position_ - length + kEncapsulationBytes) +
+                        ": a string must end with its only NUL"};
   }
 
   std::uint32_t TakeLength() {

@@ -16,6 +16,8 @@ class Checks {
   Checks& Key(std::string_view field, const std::string& text, bool may_be_empty = false) {
     if (text.empty() && !may_be_empty) {
       Fail(field, "is empty");
+    } else if (text.find('\0') != std::string::npos) {
+      Fail(field, "contains a NUL byte");
     } else if (text.size() > kMaxKeyBytes) {
       Fail(field, "has " + std::to_string(text.size()) + " bytes, at most " +
                       std::to_string(kMaxKeyBytes) + " are allowed");
