@@ -132,9 +132,15 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
     few.clear();
     for (int k = 0; k < kMostForChoice; ++k) few.push_back(k * n / kMostForChoice);
   }
-  Eigen::MatrixXd few_values(3 * static_cast<Eigen::Index>(few.size()), values_.cols());
+  const Eigen::Index columns = std::min(values_.cols(), kFramesForChoice);
+  Eigen::MatrixXd few_values(3 * static_cast<Eigen::Index>(few.size()), columns);
   for (std::size_t k = 0; k < few.size(); ++k) {
-    few_values.middleRows<3>(3 * static_cast<Eigen::Index>(k)) = values_.middleRows<3>(3 * few[k]);
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      // The first and the last frame are among them.
+      const Eigen::Index frame = columns > 1 ? c * (values_.cols() - 1) / (columns - 1) : 0;
+      few_values.block<3, 1>(3 * static_cast<Eigen::Index>(k), c) =
+          values_.block<3, 1>(3 * few[k], frame);
+    }
   }
 
   struct Candidate {
