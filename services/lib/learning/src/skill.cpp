@@ -88,9 +88,9 @@ std::vector<std::string> ChoicesOf(Method method) {
   return {kFramesByLengthChoice, kFramesChoice, kPaperChoice};
 }
 
-// The least left-out error of path and end together. The first, which has proved itself on data of
-// other people, gives way only to one that is clearly better: a few trials tell small differences
-// badly.
+// The least left-out error of path and end together. The first gives way only to one that is
+// clearly better, since a few trials tell small differences badly (DECISIONS.md says how it came
+// first).
 std::string Choose(Method method, const Exemplars& exemplars, std::vector<MethodScore>& scores) {
   if (scores.empty()) {
     const bool frames = method != Method::kPaper && exemplars.has_tool;
