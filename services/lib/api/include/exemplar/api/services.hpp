@@ -102,7 +102,8 @@ class SkillApi {
   /// Against a trial file that is not part of the skill.
   virtual Result<learning::Evaluation> Evaluate(const std::string& name, int version,
                                                 const std::string& file_name, std::string file) = 0;
-  /// The skill as a JSON document (alignment and all): figures are drawn from it.
+  /// The skill as a JSON document: learning::ToJson(skill) with its "inspection" beside it. Figures
+  /// are drawn from it.
   virtual Result<std::string> ExportJson(const std::string& name, int version) = 0;
 };
 
