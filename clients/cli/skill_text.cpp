@@ -11,6 +11,7 @@ namespace {
 
 std::string Seconds(const std::vector<double>& times) {
   std::vector<std::string> words;
+  words.reserve(times.size());
   for (const double time : times) words.push_back(FormatFixed(time, 2));
   return words.empty() ? "none" : Join(words, " ");
 }

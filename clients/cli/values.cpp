@@ -82,7 +82,8 @@ Status ParseJointStart(std::string_view text, demonstration::SkillQuery& query) 
           std::string(kOption));
     }
     if (named) query.joint_start_names.emplace_back(Trim(word.substr(0, equals)));
-    values += (values.empty() ? "" : ",") + std::string(named ? word.substr(equals + 1) : word);
+    if (!values.empty()) values += ',';
+    values += named ? word.substr(equals + 1) : word;
   }
   const Result<std::vector<double>> numbers = ParseNumbers(values, kOption);
   if (!numbers) return numbers.error();

@@ -134,7 +134,7 @@ Transaction::~Transaction() {
 }
 
 Status Transaction::Commit() {
-  const Status committed = database_->Execute("COMMIT");
+  Status committed = database_->Execute("COMMIT");
   if (committed) database_ = nullptr;
   return committed;
 }

@@ -46,7 +46,7 @@ class Skills final : public api::SkillApi {
   Result<std::vector<learning::NamedTrial>> LoadTrials(const std::string& skill,
                                                        const learning::LearnOptions& options,
                                                        const learning::Progress& progress,
-                                                       std::stop_token stop);
+                                                       const std::stop_token& stop);
   /// From memory, else from the store.
   Result<learning::Skill> Find(const std::string& name, int version);
   Result<learning::Skill> FromStore(const std::string& name, int version);
