@@ -5,6 +5,7 @@
 #include "commands.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/program/runtime.hpp"
+#include "figure_files.hpp"
 #include "screen.hpp"
 #include "skill_text.hpp"
 #include "values.hpp"
@@ -13,7 +14,7 @@ namespace exemplar::cli {
 namespace {
 
 struct Words {
-  std::string name, format, output;
+  std::string name, format, output, figures;
   int version = 0;
   std::vector<std::string> options;
 };
@@ -68,7 +69,16 @@ int Show(const Session& session, const Words& words) {
   if (!clients) return FailUsage(clients.error());
   const Result<learning::SkillReport> report = clients->skills->Show(words.name, words.version);
   if (!report) return Fail(report.error());
-  return PrintReport(*report, words.format);
+  PrintReport(*report, words.format);
+  if (words.figures.empty()) return 0;
+  const Result<std::string> document = clients->skills->ExportJson(words.name, report->version);
+  if (!document) return Fail(document.error());
+  const Result<std::vector<std::string>> written = WriteFigures(*document, words.figures);
+  if (!written) return Fail(written.error());
+  // Behind a JSON report nothing else may stand.
+  std::ostream& out = words.format == "json" ? std::cerr : std::cout;
+  for (const std::string& line : *written) out << line << '\n';
+  return 0;
 }
 
 int Versions(const Session& session, const Words& words) {
@@ -150,9 +160,13 @@ void AddSkillCommands(Command& root, const Session& session) {
 
   words = std::make_shared<Words>();
   command = AddOne(skill, "show", "Shows what learning found: trials, markers, methods, warnings",
-                   {"exemplar skill show press", "exemplar skill show press --version 2"}, words);
+                   {"exemplar skill show press", "exemplar skill show press --version 2",
+                    "exemplar skill show press --figures figures"},
+                   words);
   AddVersion(command, *words);
   AddFormat(command, words->format, {"text", "json"});
+  command.Option("--figures", "DIR", words->figures,
+                 "also draw the paper's Figs. 4 to 14 for it: SVG files and index.html");
   command.Runs([&session, words] { return Show(session, *words); });
 
   words = std::make_shared<Words>();

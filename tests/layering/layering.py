@@ -36,6 +36,7 @@ LIBRARIES = {
     "recording": ["base"],
     "ircp": ["base", "geometry", "demonstration"],
     "api": ["base", "geometry", "demonstration", "learning"],
+    "figures": ["base", "geometry", "learning"],
     "program": ["base"],
     "bus": ["base", "geometry", "demonstration", "ircp", "recording"],
     "rpc": ["base", "geometry", "demonstration", "learning", "api"],
