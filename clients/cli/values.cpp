@@ -58,8 +58,9 @@ Result<std::vector<geometry::NamedPose>> ParseObjects(const std::vector<std::str
     const std::string name = word.substr(0, equals);
     for (const geometry::NamedPose& other : objects) {
       if (other.name == name) {
-        return InvalidArgument("--object " + word + ": \"" + name + "\" is given twice",
-                               "--object");
+        std::string message = "--object " + word;
+        message += ": \"" + name + "\" is given twice";
+        return InvalidArgument(std::move(message), "--object");
       }
     }
     const Result<ReadPose> read =

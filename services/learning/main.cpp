@@ -6,37 +6,13 @@
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
 #include "exemplar/rpc/server.hpp"
+#include "learning/metrics.hpp"
 #include "learning/skills.hpp"
 #include "learning/store.hpp"
 #include "learning/trials.hpp"
 
-namespace {
-
-using namespace exemplar;
-
-std::vector<program::Metric> MetricsOf(const rpc::CallLog& calls) {
-  const auto each = [&calls](double (*value)(const rpc::CallLog::Figure&)) {
-    return [&calls, value] {
-      std::vector<program::Metric::Value> values;
-      for (const rpc::CallLog::Figure& figure : calls.figures()) {
-        values.push_back({{{"method", figure.method}, {"code", figure.code}}, value(figure)});
-      }
-      return values;
-    };
-  };
-  return {{.name = "exemplar_learning_calls_total",
-           .help = "Finished gRPC calls",
-           .counter = true,
-           .values = each([](const auto& figure) { return static_cast<double>(figure.calls); })},
-          {.name = "exemplar_learning_call_seconds_total",
-           .help = "Time spent in finished gRPC calls",
-           .counter = true,
-           .values = each([](const auto& figure) { return figure.seconds; })}};
-}
-
-}  // namespace
-
 int main(int argc, char** argv) {
+  using namespace exemplar;
   constexpr const char* kName = "exemplar-learning";
   std::string robot_folder;
   program::Options options(
@@ -58,9 +34,6 @@ int main(int argc, char** argv) {
     if (!robot) return program::Fail(kName, robot.error());
     tool = std::make_shared<kinematics::Chain>(robot->chain);
   }
-  if (common.data_dir.empty()) {
-    return program::Fail(kName, InvalidArgument("--data-dir is missing", "data-dir"));
-  }
   const auto store = learning_service::Store::Open(common.data_dir);
   if (!store) return program::Fail(kName, store.error());
 
@@ -73,12 +46,10 @@ int main(int argc, char** argv) {
                            .on_call = [&](const rpc::CallRecord& call) { calls.Record(call); }},
                           {.trials = &trials, .skills = &skills});
   if (!server) return program::Fail(kName, server.error());
-  std::unique_ptr<program::MetricsServer> metrics;
-  if (!common.metrics.empty()) {
-    auto made = program::MetricsServer::Create(common.metrics, MetricsOf(calls));
-    if (!made) return program::Fail(kName, made.error());
-    metrics = *std::move(made);
-  }
+  const auto metrics = program::ServeMetrics(
+      common,
+      learning_service::MetricsOf(rpc::MetricsOf(calls, "exemplar_learning"), trials, skills));
+  if (!metrics) return program::Fail(kName, metrics.error());
   log->Info("ready", {{"address", (*server)->address()}, {"data_dir", common.data_dir}});
   signals.Wait();
   log->Info("stopping");

@@ -130,7 +130,7 @@ Error Skills::NoSuchSkill(const std::string& name) {
 Result<std::vector<learning::NamedTrial>> Skills::LoadTrials(const std::string& skill,
                                                              const learning::LearnOptions& options,
                                                              const learning::Progress& progress,
-                                                             std::stop_token stop) {
+                                                             const std::stop_token& stop) {
   const Result<std::vector<api::TrialInfo>> infos = trials_.List(skill);
   if (!infos) return infos.error();
   if (infos->empty()) {
@@ -141,9 +141,9 @@ Result<std::vector<learning::NamedTrial>> Skills::LoadTrials(const std::string& 
       return info.id == left_out || info.source == left_out;
     });
     if (!known) {
-      return InvalidArgument(
-          "option leave_out: skill \"" + skill + "\" has no trial \"" + left_out + "\"",
-          "options.leave_out");
+      std::string message = "option leave_out: skill \"" + skill;
+      message += "\" has no trial \"" + left_out + "\"";
+      return InvalidArgument(std::move(message), "options.leave_out");
     }
   }
   std::vector<learning::NamedTrial> trials;

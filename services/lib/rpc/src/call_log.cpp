@@ -34,4 +34,20 @@ std::vector<CallLog::Figure> CallLog::figures() const {
   return all;
 }
 
+std::vector<Metric> MetricsOf(const CallLog& calls, const std::string& prefix) {
+  const auto each = [&calls](double (*number)(const CallLog::Figure&)) {
+    return [&calls, number] {
+      std::vector<Metric::Value> values;
+      for (const CallLog::Figure& figure : calls.figures()) {
+        values.push_back({{{"method", figure.method}, {"code", figure.code}}, number(figure)});
+      }
+      return values;
+    };
+  };
+  return {{prefix + "_calls_total", "Finished gRPC calls", true,
+           each([](const CallLog::Figure& figure) { return static_cast<double>(figure.calls); })},
+          {prefix + "_call_seconds_total", "Time spent in finished gRPC calls", true,
+           each([](const CallLog::Figure& figure) { return figure.seconds; })}};
+}
+
 }  // namespace exemplar::rpc

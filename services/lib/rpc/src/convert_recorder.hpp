@@ -6,8 +6,11 @@
 namespace exemplar::rpc {
 
 void ToProto(const api::RecordStart& request, v1::StartRecordingRequest* message);
-/// Errors: a waiting time that is negative or no number.
+/// Errors: a waiting or splitting time that is negative or no number.
 Result<api::RecordStart> FromProto(const v1::StartRecordingRequest& message);
+
+void ToProto(const api::RecordEvent& event, v1::MarkEventRequest* message);
+api::RecordEvent FromProto(const v1::MarkEventRequest& message);
 
 void ToProto(const api::RecorderStatus& status, v1::RecorderStatus* message);
 api::RecorderStatus FromProto(const v1::RecorderStatus& message);

@@ -27,6 +27,11 @@ class RecorderClient final : public api::RecorderApi {
   Result<api::RecorderStatus> Resume() override {
     return Do(&Stub::Resume, v1::ResumeRecordingRequest());
   }
+  Result<api::RecorderStatus> MarkEvent(const api::RecordEvent& event) override {
+    v1::MarkEventRequest request;
+    ToProto(event, &request);
+    return Do(&Stub::MarkEvent, request);
+  }
   Result<api::RecorderStatus> GetStatus() override {
     return Do(&Stub::GetStatus, v1::GetRecorderStatusRequest());
   }

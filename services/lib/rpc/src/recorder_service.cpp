@@ -33,6 +33,11 @@ class RecorderService final : public v1::RecorderService::Service {
     return Serve(shared_, *context, "exemplar.v1.RecorderService/Resume",
                  [&] { return Put(recorder_.Resume(), response); });
   }
+  grpc::Status MarkEvent(grpc::ServerContext* context, const v1::MarkEventRequest* request,
+                         v1::MarkEventResponse* response) override {
+    return Serve(shared_, *context, "exemplar.v1.RecorderService/MarkEvent",
+                 [&] { return Put(recorder_.MarkEvent(FromProto(*request)), response); });
+  }
   grpc::Status GetStatus(grpc::ServerContext* context, const v1::GetRecorderStatusRequest*,
                          v1::GetRecorderStatusResponse* response) override {
     return Serve(shared_, *context, "exemplar.v1.RecorderService/GetStatus",

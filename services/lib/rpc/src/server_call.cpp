@@ -58,7 +58,7 @@ grpc::Status Serve(ServerShared& shared, grpc::ServerContext& context, std::stri
 
 CancellationWatch::CancellationWatch(ServerShared& shared, grpc::ServerContext& context)
     : on_shutdown_(shared.shutdown().get_token(), [this] { stop_.request_stop(); }),
-      thread_([this, &context](std::stop_token done) {
+      thread_([this, &context](const std::stop_token& done) {
         constexpr auto kPeriod = std::chrono::milliseconds(20);
         std::mutex mutex;
         std::condition_variable_any wake;

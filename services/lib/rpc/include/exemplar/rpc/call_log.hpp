@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "exemplar/base/log.hpp"
+#include "exemplar/base/metric.hpp"
 #include "exemplar/rpc/server.hpp"
 
 namespace exemplar::rpc {
@@ -32,5 +33,9 @@ class CallLog {
   mutable std::mutex mutex_;
   std::map<std::pair<std::string, std::string>, Figure> figures_;
 };
+
+/// "<prefix>_calls_total" and "<prefix>_call_seconds_total" by method and code. `calls` outlives
+/// them.
+std::vector<Metric> MetricsOf(const CallLog& calls, const std::string& prefix);
 
 }  // namespace exemplar::rpc
