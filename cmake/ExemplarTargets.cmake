@@ -33,6 +33,19 @@ function(exemplar_program name)
   set_property(GLOBAL APPEND PROPERTY EXEMPLAR_PROGRAMS ${name})
 endfunction()
 
+# Every test includes GoogleTest, and most include Eigen: precompiled once they save a third of the tests'
+# compile time. The owner is an executable because -fPIE and -fPIC must agree.
+function(exemplar_use_test_headers name)
+  if(NOT TARGET exemplar_test_headers)
+    file(WRITE "${CMAKE_BINARY_DIR}/test_headers.cpp" "int main() {}\n")
+    add_executable(exemplar_test_headers "${CMAKE_BINARY_DIR}/test_headers.cpp")
+    target_link_libraries(exemplar_test_headers PRIVATE Eigen3::Eigen GTest::gmock exemplar_warnings)
+    target_precompile_headers(exemplar_test_headers PRIVATE
+      <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry> <map> <memory> <string> <vector>)
+  endif()
+  target_precompile_headers(${name} REUSE_FROM exemplar_test_headers)
+endfunction()
+
 # exemplar_test(NAME SOURCES ... DEPS ... [LABELS unit] [TIMEOUT seconds]): a GoogleTest binary,
 #   each of its tests known to ctest by name.
 function(exemplar_test name)
@@ -45,6 +58,7 @@ function(exemplar_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_DEPS} GTest::gmock GTest::gtest_main exemplar_warnings)
+  exemplar_use_test_headers(${name})
   target_compile_definitions(${name} PRIVATE
     EXEMPLAR_SOURCE_DIR="${CMAKE_SOURCE_DIR}" EXEMPLAR_BINARY_DIR="${CMAKE_BINARY_DIR}")
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}."

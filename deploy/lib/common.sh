@@ -38,7 +38,7 @@ build_preset() {
   local log=build/$preset.log
   mkdir -p build
   export CCACHE_DIR=${CCACHE_DIR:-$PWD/build/.ccache}
-  export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-time_macros}
+  export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros,include_file_mtime,include_file_ctime}
   say "configuring build/$preset"
   cmake --preset "$preset" "${options[@]}" >"$log" 2>&1 || { tail -n 30 "$log" >&2; die "configuring failed ($log)"; }
   say "building build/$preset ${*:-everything}"
