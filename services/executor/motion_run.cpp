@@ -7,7 +7,7 @@ namespace exemplar::executor {
 MotionRun::MotionRun(const kinematics::RobotDescription& robot, motion::PlannedMotion plan,
                      collision::CollisionChecker checker, const WatchLimits& limits)
     : plan_(std::move(plan)),
-      player_(plan_.trajectory),
+      player_(plan_.trajectory, robot.chain.limits()),
       position_(robot.chain.dof()),
       velocity_(robot.chain.dof()),
       commanded_(plan_.trajectory.positions.row(0).transpose()),

@@ -17,7 +17,8 @@
 
 namespace exemplar::executor {
 
-/// From full speed to rest along the path, and back. Faults, stops and emergencies: the shorter.
+/// From full speed to rest along the path, and back, where the joints' limits allow it; else as
+/// soon as they do. Faults, stops and emergencies: the shorter.
 inline constexpr double kPauseRamp_s = 0.3;
 inline constexpr double kStopRamp_s = 0.12;
 /// The last posture goes on being commanded for so long, so that the robot arrives in it.

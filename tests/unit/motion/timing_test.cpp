@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "banded.hpp"
 #include "exemplar/base/rng.hpp"
@@ -21,6 +23,7 @@ std::vector<kinematics::JointLimits> RandomLimits(int joints, Rng& rng) {
     limit.upper = 3;
     limit.velocity = rng.Uniform(0.3, 4);
     limit.acceleration = rng.Uniform(1, 20);
+    limit.jerk = rng.Uniform(20, 500);
   }
   return limits;
 }
@@ -47,6 +50,50 @@ std::vector<std::string> Names(int joints) {
   return names;
 }
 
+/// Short motions of all kinds: waves, noise, corners, still joints, two frames.
+TEST(Timing, BreaksNoLimitOnVeryManyShortMotions) {
+  const char* all = std::getenv("EXEMPLAR_TIMING_MOTIONS");
+  const long motions = all != nullptr ? std::strtol(all, nullptr, 10) : 20'000;
+  ASSERT_GT(motions, 0);
+  Rng rng(11);
+  LimitUse largest;
+  double largest_jump = 0;
+  for (long i = 0; i < motions; ++i) {
+    const int joints = 1 + static_cast<int>(rng.Below(7));
+    const std::vector<kinematics::JointLimits> limits = RandomLimits(joints, rng);
+    const int frames = 2 + static_cast<int>(rng.Below(30));
+    std::vector<double> time_s = {0};
+    while (static_cast<int>(time_s.size()) < frames) {
+      time_s.push_back(time_s.back() + rng.Uniform(0.01, 0.04));
+    }
+    Eigen::MatrixXd path = RandomPath(time_s, joints, rng);
+    const auto kind = rng.Below(4);
+    for (int k = 0; k < frames; ++k) {
+      for (int j = 0; j < joints; ++j) {
+        if (kind == 1) path(k, j) += rng.Normal(0, 0.02);
+        if (kind == 2 && k > frames / 2) path(k, j) = path(frames / 2, j);
+      }
+    }
+    if (kind == 3) path.col(0).setConstant(rng.Normal());
+    std::vector<double> frame_time_s;
+    const JointTrajectory timed =
+        TimePath(time_s, path, Names(joints), limits, rng.Uniform(0.05, 1), frame_time_s);
+    const LimitUse use = MeasureLimitUse(timed, limits);
+    largest = {std::max(largest.velocity, use.velocity),
+               std::max(largest.acceleration, use.acceleration), std::max(largest.jerk, use.jerk)};
+    largest_jump = std::max(largest_jump, LargestAccelerationJump(timed));
+    ASSERT_LE(std::max({use.velocity, use.acceleration, use.jerk}), 1) << i;
+    ASSERT_LT(LargestAccelerationJump(timed), 1e-6) << i;
+  }
+  EXPECT_GT(largest.velocity, 0.9);
+  EXPECT_GT(largest.acceleration, 0.9);
+  EXPECT_GT(largest.jerk, 0.9);
+  RecordProperty("largest_velocity_use", std::to_string(largest.velocity));
+  RecordProperty("largest_acceleration_use", std::to_string(largest.acceleration));
+  RecordProperty("largest_jerk_use", std::to_string(largest.jerk));
+  RecordProperty("largest_acceleration_jump", std::to_string(largest_jump));
+}
+
 TEST(Timing, BreaksNoLimitOnRandomMotions) {
   Rng rng(1);
   for (int i = 0; i < 200; ++i) {
@@ -63,6 +110,8 @@ TEST(Timing, BreaksNoLimitOnRandomMotions) {
     const LimitUse use = MeasureLimitUse(timed, limits);
     EXPECT_LE(use.velocity, 1 + 1e-9) << i;
     EXPECT_LE(use.acceleration, 1 + 1e-9) << i;
+    EXPECT_LE(use.jerk, 1 + 1e-9) << i;
+    EXPECT_LT(LargestAccelerationJump(timed), 1e-7) << i;
     EXPECT_EQ(timed.velocities.row(0).norm(), 0) << i;
     EXPECT_EQ(timed.velocities.bottomRows(1).norm(), 0) << i;
     EXPECT_GE(timed.duration_s(), time_s.back() / scale * 0.999) << i;
@@ -127,6 +176,8 @@ TEST(Timing, LinesKeepTheirShareOfTheLimits) {
     const LimitUse use = MeasureLimitUse(line, limits);
     EXPECT_LE(use.velocity, 0.5 + 1e-9);
     EXPECT_LE(use.acceleration, 1 + 1e-9);
+    EXPECT_LE(use.jerk, 1 + 1e-9);
+    EXPECT_LT(LargestAccelerationJump(line), 1e-7);
     EXPECT_EQ(line.positions.row(0).transpose(), from);
     EXPECT_EQ(line.positions.bottomRows(1).transpose(), to);
   }

@@ -37,8 +37,9 @@ class DescriptionReader {
     if (!urdf) return urdf.error();
     Result<RobotModel> model = ReadUrdf(folder_ / *urdf);
     if (!model) return model.error();
-    if (Status status = ReadAcceleration(root["acceleration"], *model); !status) {
-      return status.error();
+    for (const auto& [key, limit] : {std::pair("acceleration", &JointLimits::acceleration),
+                                     std::pair("jerk", &JointLimits::jerk)}) {
+      if (Status status = ReadLimit(root, key, limit, *model); !status) return status.error();
     }
     Result<Chain> chain = ReadChain(root, *model);
     if (!chain) return chain.error();
@@ -54,8 +55,8 @@ class DescriptionReader {
   }
 
  private:
-  static constexpr std::array<std::string_view, 7> kKeys = {
-      "urdf", "base", "tip", "touch_links", "home", "acceleration", "servo"};
+  static constexpr std::array<std::string_view, 8> kKeys = {
+      "urdf", "base", "tip", "touch_links", "home", "acceleration", "jerk", "servo"};
   static constexpr std::array<std::string_view, 2> kServoKeys = {"stiffness", "damping"};
 
   Error At(const YAML::Node& node, const std::string& what) const {
@@ -138,15 +139,17 @@ class DescriptionReader {
     return {};
   }
 
-  Status ReadAcceleration(const YAML::Node& map, RobotModel& model) const {
+  Status ReadLimit(const YAML::Node& root, const char* limit_name, double JointLimits::*limit,
+                   RobotModel& model) const {
+    const YAML::Node map = root[limit_name];
     if (!map) return {};
     std::vector<std::string> names;
     for (const Joint& joint : model.joints) names.push_back(joint.name);
-    return ForEachNamed(map, "acceleration", names,
+    return ForEachNamed(map, limit_name, names,
                         [&](const YAML::Node& node, const std::string& key, int index) -> Status {
                           Result<double> value = ReadPositive(node, key);
                           if (!value) return value.error();
-                          model.joints[index].limits.acceleration = *value;
+                          model.joints[index].limits.*limit = *value;
                           return {};
                         });
   }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "path_clock.hpp"
+#include "smooth_cubic.hpp"
 #include "spline.hpp"
 
 namespace exemplar::motion {
@@ -18,6 +20,10 @@ constexpr double kPathAcceleration_per_s = 8;
 /// Room for what happens between grid points.
 constexpr double kLimitShare = 0.97;
 constexpr double kLineStep_s = 0.01;
+/// Rounds of slowing down where it is needed, before all is slowed down for what is left; and by
+/// how much more than needed, for what a slow stretch itself costs at its ends.
+constexpr int kSlowDownRounds = 8;
+constexpr double kSlowDownMore = 1.02;
 
 /// One step of the path: all pairs (x, u) of squared path speed and path acceleration with
 /// a x + b u <= c for every row.
@@ -127,11 +133,58 @@ void Stretch(JointTrajectory& trajectory, double factor) {
   trajectory.velocities /= factor;
 }
 
+/// How much longer a stretch must take for its limits to hold, 1: they do.
+double NeededFactor(const LimitUse& use) {
+  return std::max({use.velocity, std::sqrt(use.acceleration), std::cbrt(use.jerk)}) / kLimitShare;
+}
+
 /// Slows all of it down until the limits hold on the cubic pieces themselves.
 void FitLimits(JointTrajectory& trajectory, const std::vector<kinematics::JointLimits>& limits) {
-  const LimitUse use = MeasureLimitUse(trajectory, limits);
-  const double factor = std::max(use.velocity, std::sqrt(use.acceleration));
+  const double factor = NeededFactor(MeasureLimitUse(trajectory, limits));
   if (factor > 1) Stretch(trajectory, factor * (1 + 1e-9));
+}
+
+/// The use of the limits on the piece from frame i to the next.
+LimitUse PieceUse(const JointTrajectory& trajectory,
+                  const std::vector<kinematics::JointLimits>& limits, Eigen::Index i) {
+  LimitUse use;
+  const double h = trajectory.time_s[i + 1] - trajectory.time_s[i];
+  for (Eigen::Index j = 0; j < trajectory.positions.cols(); ++j) {
+    const double slope = (trajectory.positions(i + 1, j) - trajectory.positions(i, j)) / h;
+    const double v0 = trajectory.velocities(i, j);
+    const double v1 = trajectory.velocities(i + 1, j);
+    // On a cubic piece the jerk is constant and the acceleration linear: its extremes are at the
+    // ends.
+    const double a0 = (6 * slope - 4 * v0 - 2 * v1) / h;
+    const double a1 = (2 * v0 + 4 * v1 - 6 * slope) / h;
+    double velocity = std::max(std::abs(v0), std::abs(v1));
+    if ((a0 < 0) != (a1 < 0)) {
+      velocity = std::max(velocity, std::abs(v0 - 0.5 * a0 * a0 * h / (a1 - a0)));
+    }
+    use.velocity = std::max(use.velocity, velocity / limits[j].velocity);
+    use.acceleration =
+        std::max(use.acceleration, std::max(std::abs(a0), std::abs(a1)) / limits[j].acceleration);
+    use.jerk = std::max(use.jerk, std::abs(a1 - a0) / h / limits[j].jerk);
+  }
+  return use;
+}
+
+/// Slows down where a limit is broken and a little around it, a few times. True when none is.
+bool SlowDownWhereNeeded(PathClock& clock, JointTrajectory& trajectory,
+                         const std::vector<kinematics::JointLimits>& limits) {
+  std::vector<double> factors(clock.time_s.size(), 1.0);
+  bool broken = false;
+  for (std::size_t i = 0; i + 1 < factors.size(); ++i) {
+    const double needed = NeededFactor(PieceUse(trajectory, limits, static_cast<Eigen::Index>(i)));
+    if (needed <= 1) continue;
+    broken = true;
+    factors[i] = std::max(factors[i], kSlowDownMore * needed);
+    factors[i + 1] = kSlowDownMore * needed;
+  }
+  if (!broken) return true;
+  SlowDown(clock, factors);
+  trajectory.time_s = clock.time_s;
+  return false;
 }
 
 }  // namespace
@@ -152,37 +205,28 @@ JointTrajectory TimePath(std::span<const double> time_s,
   for (int i = 0; i < points; ++i) grid.push_back(spline.At(time_s.front() + i * step));
   const std::vector<double> x = SpeedProfile(grid, step, limits, speed_scale).Solve();
 
+  PathClock clock = MakeClock(x, step);
   JointTrajectory out;
   out.joint_names = joint_names;
-  out.positions.resize(points, joints.cols());
-  out.velocities.resize(points, joints.cols());
-  out.time_s.resize(static_cast<std::size_t>(points));
-  double now = 0;
-  for (int i = 0; i < points; ++i) {
-    if (i > 0) {
-      const double mean_speed = 0.5 * (std::sqrt(x[i - 1]) + std::sqrt(x[i]));
-      // Two neighbouring stops: the path's acceleration bound alone says how long that takes.
-      now += mean_speed > 1e-9 ? step / mean_speed : 2 * std::sqrt(step / kPathAcceleration_per_s);
-    }
-    out.time_s[i] = now;
-    out.positions.row(i) = grid[i].value.transpose();
-    out.velocities.row(i) = std::sqrt(x[i]) * grid[i].first.transpose();
+  out.time_s = clock.time_s;
+  out.positions.resize(static_cast<Eigen::Index>(clock.place.size()), joints.cols());
+  for (std::size_t i = 0; i < clock.place.size(); ++i) {
+    out.positions.row(static_cast<Eigen::Index>(i)) =
+        spline.At(time_s.front() + clock.place[i]).value.transpose();
   }
-  const double before = out.duration_s();
+  const Eigen::MatrixXd on_path = out.positions;
+  JoinSmoothly(out);
+  for (int round = 0; round < kSlowDownRounds; ++round) {
+    if (SlowDownWhereNeeded(clock, out, limits)) break;
+    out.positions = on_path;
+    JoinSmoothly(out);
+  }
   FitLimits(out, limits);
-  const double stretched = out.duration_s() / before;
+  const double stretched = out.duration_s() / clock.time_s.back();
 
   frame_time_s.resize(time_s.size());
   for (std::size_t k = 0; k < time_s.size(); ++k) {
-    const double at = (time_s[k] - time_s.front()) / step;
-    const int i = std::clamp(static_cast<int>(at), 0, points - 2);
-    const double part = std::clamp(at - i, 0.0, 1.0) * step;
-    // x is linear over a step, so the time within it follows from the mean speed so far.
-    const double x_part = x[i] + part / step * (x[i + 1] - x[i]);
-    const double mean_speed = 0.5 * (std::sqrt(x[i]) + std::sqrt(std::max(0.0, x_part)));
-    const double whole = out.time_s[i + 1] - out.time_s[i];
-    const double within = mean_speed > 1e-9 ? stretched * part / mean_speed : part / step * whole;
-    frame_time_s[k] = out.time_s[i] + std::min(whole, within);
+    frame_time_s[k] = stretched * TimeAt(clock, time_s[k] - time_s.front());
   }
   return out;
 }
@@ -194,6 +238,7 @@ JointTrajectory TimeLine(const Eigen::Ref<const Eigen::VectorXd>& from,
                          double velocity_fraction) {
   // The minimum-jerk profile 10 r^3 - 15 r^4 + 6 r^5 (Flash & Hogan 1985).
   constexpr double kPeakVelocity = 1.875;
+  constexpr double kPeakJerk = 60;
   const double peak_acceleration = 10 / std::sqrt(3.0);
   const Eigen::VectorXd way = to - from;
   double duration = 0.1;
@@ -203,6 +248,7 @@ JointTrajectory TimeLine(const Eigen::Ref<const Eigen::VectorXd>& from,
         duration, kPeakVelocity * length / (velocity_fraction * kLimitShare * limits[j].velocity));
     duration = std::max(
         duration, std::sqrt(peak_acceleration * length / (kLimitShare * limits[j].acceleration)));
+    duration = std::max(duration, std::cbrt(kPeakJerk * length / (kLimitShare * limits[j].jerk)));
   }
   const int points =
       std::clamp(static_cast<int>(std::ceil(duration / kLineStep_s)) + 1, 11, kMaxGridPoints);
@@ -210,14 +256,13 @@ JointTrajectory TimeLine(const Eigen::Ref<const Eigen::VectorXd>& from,
   out.joint_names = joint_names;
   out.time_s.resize(static_cast<std::size_t>(points));
   out.positions.resize(points, way.size());
-  out.velocities.resize(points, way.size());
   for (int i = 0; i < points; ++i) {
     const double r = static_cast<double>(i) / (points - 1);
     out.time_s[i] = duration * r;
     out.positions.row(i) = (from + r * r * r * (10 - 15 * r + 6 * r * r) * way).transpose();
-    out.velocities.row(i) = (30 * r * r * (1 - r) * (1 - r) / duration * way).transpose();
   }
   out.positions.row(points - 1) = to.transpose();
+  JoinSmoothly(out);
   FitLimits(out, limits);
   return out;
 }
@@ -241,26 +286,30 @@ LimitUse MeasureLimitUse(const JointTrajectory& trajectory,
                          const std::vector<kinematics::JointLimits>& limits) {
   LimitUse use;
   for (std::size_t i = 0; i + 1 < trajectory.time_s.size(); ++i) {
-    const double h = trajectory.time_s[i + 1] - trajectory.time_s[i];
-    const auto row = static_cast<Eigen::Index>(i);
-    for (Eigen::Index j = 0; j < trajectory.positions.cols(); ++j) {
-      const double slope = (trajectory.positions(row + 1, j) - trajectory.positions(row, j)) / h;
-      const double v0 = trajectory.velocities(row, j);
-      const double v1 = trajectory.velocities(row + 1, j);
-      // On a cubic piece the acceleration is linear: its extremes are at the ends.
-      const double a0 = (6 * slope - 4 * v0 - 2 * v1) / h;
-      const double a1 = (2 * v0 + 4 * v1 - 6 * slope) / h;
-      double velocity = std::max(std::abs(v0), std::abs(v1));
-      if ((a0 < 0) != (a1 < 0)) {
-        const double peak = v0 - 0.5 * a0 * a0 * h / (a1 - a0);
-        velocity = std::max(velocity, std::abs(peak));
-      }
-      use.velocity = std::max(use.velocity, velocity / limits[j].velocity);
-      use.acceleration =
-          std::max(use.acceleration, std::max(std::abs(a0), std::abs(a1)) / limits[j].acceleration);
-    }
+    const LimitUse piece = PieceUse(trajectory, limits, static_cast<Eigen::Index>(i));
+    use.velocity = std::max(use.velocity, piece.velocity);
+    use.acceleration = std::max(use.acceleration, piece.acceleration);
+    use.jerk = std::max(use.jerk, piece.jerk);
   }
   return use;
+}
+
+double LargestAccelerationJump(const JointTrajectory& trajectory) {
+  double largest = 0;
+  const auto frames = static_cast<Eigen::Index>(trajectory.time_s.size());
+  for (Eigen::Index j = 0; j < trajectory.positions.cols(); ++j) {
+    double before = 0;
+    for (Eigen::Index i = 0; i + 1 < frames; ++i) {
+      const double h = trajectory.time_s[i + 1] - trajectory.time_s[i];
+      const double slope = (trajectory.positions(i + 1, j) - trajectory.positions(i, j)) / h;
+      const double v0 = trajectory.velocities(i, j);
+      const double v1 = trajectory.velocities(i + 1, j);
+      largest = std::max(largest, std::abs((6 * slope - 4 * v0 - 2 * v1) / h - before));
+      before = (2 * v0 + 4 * v1 - 6 * slope) / h;
+    }
+    largest = std::max(largest, std::abs(before));
+  }
+  return largest;
 }
 
 }  // namespace exemplar::motion

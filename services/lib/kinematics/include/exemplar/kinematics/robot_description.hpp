@@ -8,6 +8,7 @@
 //   touch_links: [finger] # links that may touch what a skill is about
 //   home: {joint1: 0.0, ...}                    # rad or m; every chain joint
 //   acceleration: {default: 5.0, joint1: 3.0}   # rad/s^2
+//   jerk: {default: 200.0, joint1: 100.0}           # rad/s^3
 //   servo: {default: {stiffness: 400, damping: 40}, joint1: {...}}   # for the simulator
 
 #include <Eigen/Core>

@@ -57,18 +57,21 @@ struct Link {
 
 enum class JointType { kFixed, kRevolute, kContinuous, kPrismatic };
 
-// Used where a URDF says nothing: it has no acceleration limits, and continuous joints may go
-// without any.
+// Used where a URDF says nothing: it has no acceleration and jerk limits, and continuous joints may
+// go without any.
 inline constexpr double kDefaultAcceleration = 10.0;  // rad/s^2 or m/s^2
-inline constexpr double kDefaultVelocity = 3.0;       // rad/s
-inline constexpr double kDefaultEffort = 100.0;       // N m
+/// The default acceleration is reached within a twentieth of a second.
+inline constexpr double kDefaultJerk = 200.0;    // rad/s^3 or m/s^3
+inline constexpr double kDefaultVelocity = 3.0;  // rad/s
+inline constexpr double kDefaultEffort = 100.0;  // N m
 
 struct JointLimits {
   double lower = 0;  ///< rad or m; -infinity for continuous joints
   double upper = 0;
-  double velocity = 0;      ///< rad/s or m/s, positive
-  double effort = 0;        ///< N m or N, positive
-  double acceleration = 0;  ///< rad/s^2 or m/s^2; kDefaultAcceleration unless robot.yaml says
+  double velocity = 0;         ///< rad/s or m/s, positive
+  double effort = 0;           ///< N m or N, positive
+  double acceleration = 0;     ///< rad/s^2 or m/s^2; kDefaultAcceleration unless robot.yaml says
+  double jerk = kDefaultJerk;  ///< rad/s^3 or m/s^3, positive; kDefaultJerk unless robot.yaml says
 };
 
 struct Mimic {
