@@ -34,10 +34,20 @@ Eigen::Vector3d LogSo3(const Eigen::Quaterniond& rotation) {
 }
 
 Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& rotation_vector) {
-  const double angle = rotation_vector.norm();
-  const double scale = angle < 1e-9 ? 0.5 - angle * angle / 48.0 : std::sin(angle / 2) / angle;
-  const Eigen::Vector3d v = scale * rotation_vector;
-  return Eigen::Quaterniond(std::cos(angle / 2), v.x(), v.y(), v.z()).normalized();
+  const double half_squared = rotation_vector.squaredNorm() / 4;
+  double cosine, sinc;  // of half the angle
+  if (half_squared < 0.04) {
+    // Their series; what is left out is below rounding.
+    const double x = half_squared;
+    cosine = 1 - x / 2 * (1 - x / 12 * (1 - x / 30 * (1 - x / 56 * (1 - x / 90 * (1 - x / 132)))));
+    sinc = 1 - x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110 * (1 - x / 156)))));
+  } else {
+    const double half = std::sqrt(half_squared);
+    cosine = std::cos(half);
+    sinc = std::sin(half) / half;
+  }
+  const Eigen::Vector3d v = sinc / 2 * rotation_vector;
+  return Eigen::Quaterniond(cosine, v.x(), v.y(), v.z()).normalized();
 }
 
 double AngleBetween(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {

@@ -84,6 +84,7 @@ void WarnWhenFar(const Exemplars& exemplars, std::size_t object, const Eigen::Ve
   const Eigen::MatrixXd positions = ObjectPositions(exemplars, object);
   const double distance = DistanceFromHull(positions, position);
   double extent = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
+  if (distance <= kFarPart * extent) return;
   const bool one_place = extent < 0.05 * MotionExtent(exemplars);
   if (one_place) extent = 0.5 * MotionExtent(exemplars);
   if (distance <= kFarPart * extent) return;

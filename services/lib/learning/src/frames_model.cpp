@@ -58,11 +58,11 @@ FramesModel::FramesModel(const Exemplars& exemplars)
       contacts_(exemplars.contacts) {
   const int n = exemplars.size();
   style_ = ChooseStyle(exemplars);
-  joints_ = Bundle(frames_, joints_count_, n);
+  joints_.resize(frames_ * joints_count_, n);
   if (exemplars.trials[0].hand.size() > 0) hand_ = Bundle(frames_, 1, n);
   for (int j = 0; j < n; ++j) {
     const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
-    joints_.Set(j, trial.joints);
+    joints_.col(j) = trial.joints.reshaped();
     if (!hand_.empty()) hand_.Set(j, trial.hand);
   }
   objectivity_ = Eigen::MatrixXd::Zero(frames_, exemplars.objects());
@@ -121,13 +121,7 @@ void FramesModel::MeetContacts(const Situation& situation, Prediction& predictio
 Prediction FramesModel::Predict(const Situation& situation) const {
   Prediction prediction;
   const Eigen::VectorXd weights = StyleWeights(situation);
-  prediction.joints.resize(frames_, joints_count_);
-  if (joints_count_ > 0) {
-    const Eigen::VectorXd stacked = joints_.Sum(weights);
-    for (int i = 0; i < frames_; ++i) {
-      prediction.joints.row(i) = stacked.segment(i * joints_count_, joints_count_).transpose();
-    }
-  }
+  prediction.joints = WeightedSum(joints_, weights).reshaped(frames_, joints_count_);
   if (!hand_.empty()) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
   prediction.objectivity = objectivity_;
   Eigen::VectorXd start_share = Eigen::VectorXd::Zero(frames_);

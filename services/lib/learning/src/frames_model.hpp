@@ -35,7 +35,8 @@ class FramesModel final : public Model {
   std::optional<PathFrames> path_;
   std::optional<RotationFrames> rotation_;
   std::optional<CardinalRbf> style_;  // of joints and hand, over the target's position
-  Bundle joints_, hand_;
+  Eigen::MatrixXd joints_;            // a trial's joint values (column by column) a column
+  Bundle hand_;
   Eigen::MatrixXd objectivity_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "exemplar/base/text.hpp"
+#include "weighted_sum.hpp"
 
 namespace exemplar::learning {
 namespace {
@@ -190,22 +191,22 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
 
 PathFrames::Answer PathFrames::Predict(const FrameSituation& situation) const {
   const auto n = static_cast<Eigen::Index>(situations_.size());
-  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(3, 3 * n);
+  Eigen::Matrix3Xd weights = Eigen::Matrix3Xd::Zero(3, 3 * n);
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(values_.cols());
-  Eigen::MatrixXd cross(3, 3 * n);
+  Eigen::Matrix3Xd cross(3, 3 * n);
   for (const Member& member : members_) {
     for (Eigen::Index j = 0; j < n; ++j) {
       cross.middleCols<3>(3 * j) =
           Covariance(situation, situations_[static_cast<std::size_t>(j)], member.gains);
     }
-    const Eigen::MatrixXd own = member.kriging.Weights(cross);
+    const Eigen::Matrix3Xd own = member.kriging.Weights(cross);
     weights += member.share * own;
     const double known =
-        (Covariance(situation, situation, member.gains) - own * cross.transpose()).trace();
+        Covariance(situation, situation, member.gains).trace() - own.cwiseProduct(cross).sum();
     variance += member.share * (3 + std::max(0.0, known)) * member.kriging.noise_variance();
   }
   Answer answer;
-  answer.positions.noalias() = weights * values_;
+  answer.positions = WeightedBlocks(weights, values_);
   answer.positions.colwise() += situation.object;
   answer.sigma_m = variance.cwiseSqrt();
   return answer;

@@ -5,6 +5,7 @@
 
 #include "exemplar/geometry/pose.hpp"
 #include "exemplars.hpp"
+#include "weighted_sum.hpp"
 
 namespace exemplar::learning {
 
@@ -37,7 +38,7 @@ class Bundle {
   void Set(int trial, const Eigen::Ref<const Eigen::MatrixXd>& stream);
   /// Frame-major: channel k of frame i at i * channels + k.
   Eigen::VectorXd Sum(const Eigen::Ref<const Eigen::VectorXd>& weights) const {
-    return stacked_ * weights;
+    return WeightedSum(stacked_, weights);
   }
   const Eigen::MatrixXd& stacked() const { return stacked_; }
   int channels() const { return channels_; }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "weighted_sum.hpp"
+
 namespace exemplar::learning {
 namespace {
 
@@ -99,12 +101,11 @@ RotationFrames::RotationFrames(const Exemplars& exemplars, const PathFrames& pat
   with_object_ = best->with_object;
   residual_ = best->residual;
   mean_ = std::move(best->mean);
-  values_ = std::move(best->values);
-  inverse_ = best->kriging->inverse();
+  first_ = best->values.col(0);
+  duals_ = best->kriging->Duals(best->values);
 
   // How much of a start's deviation is left at each frame: the start's posterior coefficient.
-  const Eigen::MatrixXd duals = inverse_ * values_;
-  start_share_ = kStartGain * (values_.col(0).transpose() * duals).transpose();
+  start_share_ = kStartGain * (first_.transpose() * duals_).transpose();
   const double first = start_share_[0];
   if (first > 1e-3) {
     start_share_ /= first;
@@ -126,12 +127,12 @@ std::vector<Eigen::Quaterniond> RotationFrames::Predict(const Situation& situati
                              situation.base_T_start->rotation);
   }
   const auto n = static_cast<Eigen::Index>(situations_.size());
-  Eigen::MatrixXd cross(3, 3 * n);
+  Eigen::Matrix3Xd cross(3, 3 * n);
   for (Eigen::Index j = 0; j < n; ++j) {
-    cross.middleCols<3>(3 * j) = Covariance(start, where, values_.block<3, 1>(3 * j, 0),
+    cross.middleCols<3>(3 * j) = Covariance(start, where, first_.segment<3>(3 * j),
                                             situations_[static_cast<std::size_t>(j)], residual_);
   }
-  const Eigen::Matrix3Xd vectors = (cross * inverse_) * values_;
+  const Eigen::Matrix3Xd vectors = WeightedBlocks(cross, duals_);
   const Eigen::Vector3d missing = start - vectors.col(0);
   std::vector<Eigen::Quaterniond> rotations;
   rotations.reserve(mean_.size());

@@ -35,9 +35,9 @@ class RotationFrames {
   double length_m_ = 1;
   double residual_ = 0;
   std::vector<Eigen::Quaterniond> mean_;  // in the chosen frame, one a frame
-  Eigen::MatrixXd values_;                // 3n x frames: rotation vectors from the mean
+  Eigen::VectorXd first_;                 // 3n: rotation vectors from the mean at the first frame
   std::vector<FrameSituation> situations_;
-  Eigen::MatrixXd inverse_;  // 3n x 3n
+  Eigen::MatrixXd duals_;  // 3n x frames: inverse covariance times rotation vectors
   Eigen::VectorXd start_share_;
 };
 
