@@ -15,7 +15,8 @@ constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
 constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(5);
-constexpr double kWayToStart = 1.0;      // s
+constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
+constexpr double kWayToStart = 1.0;                                     // s
 constexpr double kBeyondTravel = 0.003;  // m, as one presses who wants to feel the stop
 
 Result<scene::Button> FindButton(const scene::Description& scene, const std::string& name) {
@@ -91,10 +92,8 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
       });
   if (!control) return control.error();
   session->control_ = std::move(*control);
-  const ircp::Writer<ircp::SuitSample>* writer = session->suit_.get();
-  session->control_->SetSentCounts([writer] {
-    return std::vector<ircp::TopicCount>{{ircp::SuitSample::kTopic, kSource, writer->sent()}};
-  });
+  const PersonSession* counted = session.get();
+  session->control_->SetSentCounts([counted] { return counted->sent(); });
   return session;
 }
 
@@ -102,7 +101,7 @@ Status PersonSession::Run(std::stop_token stop) {
   if (suit_) WaitForReaders(stop);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (stop.stop_requested()) return Cancelled();
-    if (Status status = PlaceButton(places_[i]); !status) return status;
+    if (Status status = PlaceButton(places_[i], stop); !status) return status;
     if (options_.place_only) {
       log_.Info("button at " + PlaceText(places_[i]));
     } else if (Status status = Perform(i, stop); !status) {
@@ -111,7 +110,7 @@ Status PersonSession::Run(std::stop_token stop) {
   }
   if (!suit_) return {};
   if (Status status = MoveTo(person_.rest(), kWayToStart, stop); !status) return status;
-  if (!suit_->WaitForAcknowledgments(kAcknowledgeTimeout)) {
+  if (!WaitForAcknowledgments(stop)) {
     log_.Warning("not every reader has acknowledged the last samples",
                  {{"topic", ircp::SuitSample::kTopic}});
   }
@@ -119,7 +118,8 @@ Status PersonSession::Run(std::stop_token stop) {
   return {};
 }
 
-Status PersonSession::PlaceButton(const geometry::Pose& base_T_button) {
+Status PersonSession::PlaceButton(const geometry::Pose& base_T_button,
+                                  const std::stop_token& stop) {
   const Eigen::Vector3d& p = base_T_button.translation;
   const Eigen::Quaterniond& q = base_T_button.rotation;
   const Result<ircp::Answer> answer = simulator_->Call("place",
@@ -131,7 +131,7 @@ Status PersonSession::PlaceButton(const geometry::Pose& base_T_button) {
                                                         {"qy", FormatDouble(q.y())},
                                                         {"qz", FormatDouble(q.z())},
                                                         {"qw", FormatDouble(q.w())}},
-                                                       kAnswerTimeout);
+                                                       kAnswerTimeout, stop);
   if (!answer)
     return WithPlace(answer.error(), "placing the button at " + PlaceText(base_T_button));
   return {};
@@ -157,7 +157,8 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
   }
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, places_.size());
-    if (Status status = recorder_->Start(name, performed->trial.source); !status) return status;
+    if (Status status = recorder_->Start(name, performed->trial.source, stop); !status)
+      return status;
   }
   control_->SetState("performing", trial);
   const Duration start = clock_.Steady();
@@ -169,14 +170,15 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
       sent = Send(joints.values.row(static_cast<Eigen::Index>(k)).transpose());
     }
   }
-  if (sent && !suit_->WaitForAcknowledgments(kAcknowledgeTimeout)) {
+  if (sent && !WaitForAcknowledgments(stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", index + 1}});
   }
   if (recorder_) {
-    const Status stopped = recorder_->Stop();
+    const Status stopped = recorder_->Stop(stop);
     if (!stopped && sent) sent = stopped;
   }
   if (sent) {
+    ++trials_ended_;
     log_.Info(trial + ": button at " + PlaceText(places_[index]) + ", " +
               FormatFixed(performed->trial.duration_s(), 1) + " s");
   }
@@ -218,6 +220,19 @@ void PersonSession::WaitForReaders(std::stop_token stop) {
                                                  {"readers", suit_->matched_readers()},
                                                  {"expected", wanted}});
   }
+}
+
+bool PersonSession::WaitForAcknowledgments(const std::stop_token& stop) {
+  const Duration deadline = clock_.Steady() + kAcknowledgeTimeout;
+  while (!suit_->WaitForAcknowledgments(kAcknowledgeSlice)) {
+    if (stop.stop_requested() || clock_.Steady() >= deadline) return false;
+  }
+  return true;
+}
+
+std::vector<ircp::TopicCount> PersonSession::sent() const {
+  if (suit_ == nullptr) return {};
+  return {{ircp::SuitSample::kTopic, kSource, suit_->sent()}};
 }
 
 }  // namespace exemplar::capture_suit

@@ -1,6 +1,7 @@
 #pragma once
 // A simulated person in the suit, in real time.
 
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "capture_suit/recorder_remote.hpp"
+#include "capture_suit/session.hpp"
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/ircp/bus.hpp"
@@ -30,30 +32,30 @@ struct PersonSessionOptions {
 };
 
 /// For every place: tells the simulator to put the button there, moves to the start of the trial,
-/// has it recorded, and sends the person's joints on ircp/suit. Thread-compatible; Run on one
-/// thread.
-class PersonSession {
+/// has it recorded, and sends the person's joints on ircp/suit.
+class PersonSession final : public Session {
  public:
   static Result<std::unique_ptr<PersonSession>> Create(ircp::Bus& bus, const Clock& clock, Log& log,
                                                        const kinematics::RobotDescription& robot,
                                                        const scene::Description& scene,
                                                        const PersonSessionOptions& options);
 
-  /// Ends after the last place, at the first error, or soon after `stop` (kCancelled; a recording
-  /// that runs is stopped first).
-  Status Run(std::stop_token stop);
+  Status Run(std::stop_token stop) override;
+  std::vector<ircp::TopicCount> sent() const override;
+  std::uint64_t trials_ended() const override { return trials_ended_; }
 
  private:
   PersonSession(const Clock& clock, Log& log, scene::Button button,
                 std::vector<geometry::Pose> places, reaching::Person person,
                 const PersonSessionOptions& options);
 
-  Status PlaceButton(const geometry::Pose& base_T_button);
+  Status PlaceButton(const geometry::Pose& base_T_button, const std::stop_token& stop);
   Status Perform(std::size_t index, std::stop_token stop);
   /// Sends a smooth way from where the suit is to `goal`.
   Status MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop);
   Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture);
   void WaitForReaders(std::stop_token stop);
+  bool WaitForAcknowledgments(const std::stop_token& stop);
 
   const Clock& clock_;
   Log& log_;
@@ -62,6 +64,7 @@ class PersonSession {
   reaching::Person person_;
   PersonSessionOptions options_;
   Eigen::VectorXd posture_;  ///< sent last
+  std::atomic<std::uint64_t> trials_ended_{0};
   std::unique_ptr<ircp::Writer<ircp::SuitSample>> suit_;
   std::unique_ptr<ircp::ControlClient> simulator_;
   std::optional<RecorderRemote> recorder_;

@@ -19,15 +19,17 @@ Result<RecorderRemote> RecorderRemote::Create(ircp::Bus& bus, const Clock& clock
   return RecorderRemote(std::move(*client));
 }
 
-Status RecorderRemote::Start(const std::string& name, const std::string& source) {
-  return Call("start", {{"name", name}, {"source", source}});
+Status RecorderRemote::Start(const std::string& name, const std::string& source,
+                             std::stop_token stop) {
+  return Call("start", {{"name", name}, {"source", source}}, std::move(stop));
 }
 
-Status RecorderRemote::Stop() { return Call("stop", {}); }
+Status RecorderRemote::Stop(std::stop_token stop) { return Call("stop", {}, std::move(stop)); }
 
-Status RecorderRemote::Call(const std::string& action,
-                            std::map<std::string, std::string> arguments) {
-  const Result<ircp::Answer> answer = client_->Call(action, std::move(arguments), kAnswerTimeout);
+Status RecorderRemote::Call(const std::string& action, std::map<std::string, std::string> arguments,
+                            std::stop_token stop) {
+  const Result<ircp::Answer> answer =
+      client_->Call(action, std::move(arguments), kAnswerTimeout, std::move(stop));
   if (!answer) return WithPlace(answer.error(), "recorder " + action);
   return {};
 }

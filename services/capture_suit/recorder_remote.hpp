@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "exemplar/ircp/control.hpp"
@@ -11,12 +12,15 @@ class RecorderRemote {
  public:
   static Result<RecorderRemote> Create(ircp::Bus& bus, const Clock& clock, std::uint64_t seed);
 
-  Status Start(const std::string& name, const std::string& source);
-  Status Stop();
+  /// After `stop` the recorder gets half a second to answer.
+  Status Start(const std::string& name, const std::string& source, std::stop_token stop);
+  /// Asks in any case; after `stop` the recorder gets half a second to answer.
+  Status Stop(std::stop_token stop);
 
  private:
   explicit RecorderRemote(std::unique_ptr<ircp::ControlClient> client);
-  Status Call(const std::string& action, std::map<std::string, std::string> arguments);
+  Status Call(const std::string& action, std::map<std::string, std::string> arguments,
+              std::stop_token stop);
   std::unique_ptr<ircp::ControlClient> client_;
 };
 

@@ -83,21 +83,22 @@ Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
   for (const std::string& notice : trial.notices) log_.Warning(notice);
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, trials_.size());
-    if (Status status = recorder_->Start(name, trial.source); !status) return status;
+    if (Status status = recorder_->Start(name, trial.source, stop); !status) return status;
   }
   control_->SetState("playing", trial.source);
   const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);
   for (const std::string& notice : samples.notices) log_.Warning(trial.source + ": " + notice);
   Status played = streams_.Play(samples, options_.rate, clock_, stop);
-  if (played && !streams_.WaitForAcknowledgments(kAcknowledgeTimeout)) {
+  if (played && !streams_.WaitForAcknowledgments(kAcknowledgeTimeout, clock_, stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", trial.source}});
   }
   control_->SetState("idle", trial.source + " played");
   if (recorder_) {
-    const Status stopped = recorder_->Stop();
+    const Status stopped = recorder_->Stop(stop);
     if (played && !stopped) played = stopped;
   }
   if (played) {
+    ++trials_ended_;
     log_.Info(place + ": " + trial.source + ", " + FormatFixed(trial.duration_s(), 1) + " s");
   }
   return played;

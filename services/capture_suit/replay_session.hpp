@@ -1,6 +1,7 @@
 #pragma once
 // Trial files played onto the topics, as if their people stood here.
 
+#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "capture_suit/recorder_remote.hpp"
+#include "capture_suit/session.hpp"
 #include "capture_suit/trial_streams.hpp"
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
@@ -28,8 +30,7 @@ struct ReplayOptions {
 /// Reads a trial CSV. Errors name file, line and column.
 Result<demonstration::Trial> ReadTrialFile(const std::filesystem::path& file);
 
-/// Thread-compatible; Run on one thread.
-class ReplaySession {
+class ReplaySession final : public Session {
  public:
   /// Precondition: trials is not empty.
   static Result<std::unique_ptr<ReplaySession>> Create(ircp::Bus& bus, const Clock& clock, Log& log,
@@ -38,7 +39,9 @@ class ReplaySession {
 
   /// Plays every trial once somebody reads (or after some seconds, with a warning), and ends when
   /// the readers have acknowledged. kCancelled soon after `stop`; a recording is stopped first.
-  Status Run(std::stop_token stop);
+  Status Run(std::stop_token stop) override;
+  std::vector<ircp::TopicCount> sent() const override { return streams_.sent(); }
+  std::uint64_t trials_ended() const override { return trials_ended_; }
 
  private:
   ReplaySession(const Clock& clock, Log& log, std::vector<demonstration::Trial> trials,
@@ -51,6 +54,7 @@ class ReplaySession {
   std::vector<demonstration::Trial> trials_;
   TrialStreams streams_;
   ReplayOptions options_;
+  std::atomic<std::uint64_t> trials_ended_{0};
   std::optional<RecorderRemote> recorder_;
   std::unique_ptr<ircp::ControlServer> control_;  ///< destroyed first: it asks streams_ for counts
 };

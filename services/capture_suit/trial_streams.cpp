@@ -6,6 +6,7 @@ namespace exemplar::capture_suit {
 namespace {
 
 constexpr const char* kSource = "replay";
+constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
 
 /// Calls visit(writer, topic) for each writer that is there.
 template <class Writers, class Visit>
@@ -78,10 +79,14 @@ std::vector<std::string> TrialStreams::UnreadTopics() const {
   return topics;
 }
 
-bool TrialStreams::WaitForAcknowledgments(Duration timeout) {
+bool TrialStreams::WaitForAcknowledgments(Duration timeout, const Clock& clock,
+                                          const std::stop_token& stop) {
+  const Duration deadline = clock.Steady() + timeout;
   bool all = true;
   ForEachWriter(writers_, [&](auto& writer, const char*) {
-    all = writer.WaitForAcknowledgments(timeout) && all;
+    while (all && !writer.WaitForAcknowledgments(kAcknowledgeSlice)) {
+      all = !stop.stop_requested() && clock.Steady() < deadline;
+    }
   });
   return all;
 }

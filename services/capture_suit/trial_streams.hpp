@@ -28,8 +28,8 @@ class TrialStreams {
   /// Topics that nobody reads.
   std::vector<std::string> UnreadTopics() const;
   std::vector<ircp::TopicCount> sent() const;
-  /// False when some reader has not acknowledged everything within `timeout` a topic.
-  bool WaitForAcknowledgments(Duration timeout);
+  /// False when some reader has not acknowledged everything within `timeout`, or `stop` came first.
+  bool WaitForAcknowledgments(Duration timeout, const Clock& clock, const std::stop_token& stop);
 
  private:
   template <class Sample>

@@ -1,5 +1,6 @@
 // exemplar-capture-tactile: what the hand feels, onto ircp/tactile.
 
+#include "capture_tactile/metrics.hpp"
 #include "capture_tactile/session.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/program/options.hpp"
@@ -28,6 +29,9 @@ int main(int argc, char** argv) {
   if (!participant) return program::Fail(kName, participant.error());
   auto session = capture_tactile::Session::Create(**participant, clock, *log, session_options);
   if (!session) return program::Fail(kName, session.error());
+  const auto metrics =
+      program::ServeMetrics(options.common(), capture_tactile::MetricsOf(**session));
+  if (!metrics) return program::Fail(kName, metrics.error());
   (*session)->Run(signals.token());
   return 0;
 }

@@ -32,10 +32,7 @@ class RobotTouch final : public Session {
         });
     if (!control) return control.error();
     control_ = std::move(*control);
-    control_->SetSentCounts([this] {
-      return std::vector<ircp::TopicCount>{
-          {ircp::TactileSample::kTopic, "tactile", writer_->sent()}};
-    });
+    control_->SetSentCounts([this] { return sent(); });
     control_->SetValues([this] {
       return std::map<std::string, std::string>{{"polls", std::to_string(polls_)},
                                                 {"stale", std::to_string(stale_)}};
@@ -70,8 +67,15 @@ class RobotTouch final : public Session {
       }
     }
     control_->SetState("stopped", "");
-    writer_->WaitForAcknowledgments(std::chrono::seconds(2));
+    writer_->WaitForAcknowledgments(std::chrono::seconds(1));
   }
+
+  std::uint64_t polls() const override { return polls_; }
+  std::uint64_t stale() const override { return stale_; }
+  std::vector<ircp::TopicCount> sent() const override {
+    return {{ircp::TactileSample::kTopic, "tactile", writer_->sent()}};
+  }
+  const ircp::Reader& reader() const override { return *reader_; }
 
  private:
   struct Touch {

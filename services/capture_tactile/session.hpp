@@ -2,8 +2,10 @@
 // The touch that a robot's hand measures, as a touch sensor's own stream: ircp/joint_state ->
 // ircp/tactile.
 
+#include <cstdint>
 #include <memory>
 #include <stop_token>
+#include <vector>
 
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
@@ -29,6 +31,12 @@ class Session {
   virtual ~Session() = default;
   /// Works until `stop`. Call once.
   virtual void Run(std::stop_token stop) = 0;
+
+  // For metrics; thread-safe.
+  virtual std::uint64_t polls() const = 0;
+  virtual std::uint64_t stale() const = 0;
+  virtual std::vector<ircp::TopicCount> sent() const = 0;
+  virtual const ircp::Reader& reader() const = 0;
 };
 
 }  // namespace exemplar::capture_tactile

@@ -1,5 +1,6 @@
 // exemplar-capture-vision: stereo pictures in, object poses out.
 
+#include "capture_vision/metrics.hpp"
 #include "capture_vision/session.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/program/options.hpp"
@@ -28,6 +29,9 @@ int main(int argc, char** argv) {
   if (!participant) return program::Fail(kName, participant.error());
   auto session = capture_vision::Session::Create(**participant, clock, *log, *scene);
   if (!session) return program::Fail(kName, session.error());
+  const auto metrics =
+      program::ServeMetrics(options.common(), capture_vision::MetricsOf(**session));
+  if (!metrics) return program::Fail(kName, metrics.error());
   (*session)->Run(signals.token());
   return 0;
 }

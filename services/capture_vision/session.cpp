@@ -18,20 +18,11 @@ constexpr const char* kProgram = "capture_vision";
 constexpr const char* kSource = "vision";
 constexpr const char* kFrame = "base";
 
-struct Counts {
-  std::uint64_t pictures = 0;
-  std::uint64_t skipped = 0;
-  std::uint64_t unreadable = 0;
-  std::uint64_t unknown_camera = 0;
-  std::uint64_t found = 0;
-  std::uint64_t one_eyed = 0;
-  std::uint64_t implausible = 0;
-};
-
 class RunningSession final : public Session {
  public:
-  RunningSession(Log& log, std::map<std::string, perception::ObjectFinder> finders)
-      : log_(log), finders_(std::move(finders)) {}
+  RunningSession(const Clock& clock, Log& log,
+                 std::map<std::string, perception::ObjectFinder> finders)
+      : clock_(clock), log_(log), finders_(std::move(finders)) {}
 
   Status Connect(ircp::Bus& bus, const Clock& clock) {
     auto writer = bus.MakeWriter<ircp::ObjectSample>(kSource);
@@ -43,9 +34,7 @@ class RunningSession final : public Session {
         });
     if (!control) return control.error();
     control_ = std::move(control).value();
-    control_->SetSentCounts([this] {
-      return std::vector<ircp::TopicCount>{{ircp::ObjectSample::kTopic, kSource, writer_->sent()}};
-    });
+    control_->SetSentCounts([this] { return sent(); });
     control_->SetValues([this] { return Values(); });
     control_->SetState("waiting", "no pictures yet");
     auto reader = bus.MakeReader<ircp::CameraSample>(
@@ -61,13 +50,29 @@ class RunningSession final : public Session {
     while (arrived_.wait(lock, stop, [this] { return !newest_.empty(); })) {
       const auto node = newest_.extract(newest_.begin());
       lock.unlock();
+      const Duration begin = clock_.Steady();
       Search(node.mapped());
+      const Duration end = clock_.Steady();
       lock.lock();
+      searching_ += end - begin;
     }
     lock.unlock();
     control_->SetState("stopped", "asked to stop");
     log_.Info("stopped");
   }
+
+  Counts counts() const override {
+    const std::lock_guard lock(mutex_);
+    return counts_;
+  }
+  double search_seconds() const override {
+    const std::lock_guard lock(mutex_);
+    return ToSeconds(searching_);
+  }
+  std::vector<ircp::TopicCount> sent() const override {
+    return {{ircp::ObjectSample::kTopic, kSource, writer_->sent()}};
+  }
+  const ircp::Reader& reader() const override { return *reader_; }
 
  private:
   /// On a thread of the network.
@@ -152,13 +157,15 @@ class RunningSession final : public Session {
             {"implausible", std::to_string(counts_.implausible)}};
   }
 
+  const Clock& clock_;
   Log& log_;
   const std::map<std::string, perception::ObjectFinder> finders_;  ///< by calibration id
 
-  mutable std::mutex mutex_;  ///< guards newest_ and counts_
+  mutable std::mutex mutex_;  ///< guards newest_, counts_ and searching_
   std::condition_variable_any arrived_;
   std::map<std::string, ircp::CameraSample> newest_;  ///< by calibration id
   Counts counts_;
+  Duration searching_{0};
 
   // Of the thread that runs.
   bool seeing_ = false;
@@ -186,7 +193,7 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
     if (!finder) return finder.error();
     finders.emplace(camera.name, std::move(finder).value());
   }
-  auto session = std::make_unique<RunningSession>(log, std::move(finders));
+  auto session = std::make_unique<RunningSession>(clock, log, std::move(finders));
   if (Status status = session->Connect(bus, clock); !status) return status.error();
   return std::unique_ptr<Session>(std::move(session));
 }

@@ -1,8 +1,10 @@
 #pragma once
 // Where the marked objects are, from the stereo pictures on ircp/camera, onto ircp/objects.
 
+#include <cstdint>
 #include <memory>
 #include <stop_token>
+#include <vector>
 
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
@@ -15,6 +17,17 @@ namespace exemplar::capture_vision {
 
 struct SessionOptions {
   perception::FinderOptions finder = {};
+};
+
+/// What came of the pictures.
+struct Counts {
+  std::uint64_t pictures = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t unreadable = 0;
+  std::uint64_t unknown_camera = 0;
+  std::uint64_t found = 0;
+  std::uint64_t one_eyed = 0;
+  std::uint64_t implausible = 0;
 };
 
 /// Pictures are taken for the scene's camera whose name is their calibration id. Every object that
@@ -33,6 +46,12 @@ class Session {
   virtual ~Session() = default;
   /// Works until `stop`. Call once.
   virtual void Run(std::stop_token stop) = 0;
+
+  // For metrics; thread-safe.
+  virtual Counts counts() const = 0;
+  virtual double search_seconds() const = 0;
+  virtual std::vector<ircp::TopicCount> sent() const = 0;
+  virtual const ircp::Reader& reader() const = 0;
 };
 
 }  // namespace exemplar::capture_vision

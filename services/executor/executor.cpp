@@ -80,9 +80,10 @@ Status Executor::Connect(ircp::Bus& bus) {
       [this](const ircp::CommandSample& command) { return OnCommand(command); });
   if (!control.ok()) return control.error();
   control_ = *std::move(control);
-  control_->SetSentCounts([this] {
-    return std::vector<ircp::TopicCount>{
-        {ircp::JointCommandSample::kTopic, kProgram, commands_->sent()}};
+  control_->SetSentCounts([this] { return sent(); });
+  control_->SetOnRival([this](const std::string& rival) {
+    log_.Warning("another executor runs in this station: both command the robot",
+                 {{"writer", rival}, {"advice", "end one of them, or give it its own --station"}});
   });
   control_->SetValues([this] {
     std::map<std::string, std::string> values = {{"speed", FormatDouble(speed_.load())}};
@@ -234,6 +235,32 @@ std::optional<Duration> Executor::StateAge() const {
   return clock_.Steady() - Duration(received);
 }
 
+ExecutorFigures Executor::figures() const {
+  ExecutorFigures now;
+  now.state = ToString(state_.load());
+  now.speed = speed_.load();
+  now.plans_refused = plans_refused_.load(std::memory_order_relaxed);
+  now.commands_dropped = commands_->dropped();
+  now.commands_failed = commands_->failed();
+  now.cycles = cycles_.load(std::memory_order_relaxed);
+  now.lateness_s = ToSeconds(Duration(lateness_ns_.load(std::memory_order_relaxed)));
+  now.lateness_max_s = ToSeconds(Duration(lateness_max_ns_.load(std::memory_order_relaxed)));
+  if (const std::optional<Duration> age = StateAge()) now.state_age_s = ToSeconds(*age);
+  const std::lock_guard lock(mutex_);
+  now.executions = executions_;
+  return now;
+}
+
+std::vector<ircp::TopicCount> Executor::sent() const {
+  return {{ircp::JointCommandSample::kTopic, kProgram, commands_->sent()}};
+}
+
+std::vector<ircp::TopicReader> Executor::readers() const {
+  return {{ircp::JointStateSample::kTopic, state_reader_.get()},
+          {ircp::ObjectSample::kTopic, object_reader_.get()},
+          {ircp::SafetySample::kTopic, safety_reader_.get()}};
+}
+
 Result<api::RobotStatus> Executor::GetStatus() {
   api::RobotStatus status;
   {
@@ -368,6 +395,7 @@ Result<Executor::Planned> Executor::MakePlan(const api::ExecuteRequest& request)
   }
   Result<Planned> planned = TryPlan(request, stop);
   if (!planned.ok()) {
+    plans_refused_.fetch_add(1, std::memory_order_relaxed);
     (void)Apply(Event::kRefused, "refused: " + planned.error().message);
     return planned;
   }
@@ -456,6 +484,7 @@ Result<api::ExecutionResult> Executor::Execute(
   changed_.wait(lock, [&] { return !run->has_unwatched(); });
   result.state = ToString(run_end_);
   result.detail = run_detail_;
+  ++executions_[result.state];
   lock.unlock();
 
   commands_->Flush();
@@ -503,6 +532,7 @@ bool Executor::RunMotion(MotionRun& run, const std::stop_token& stop) {
     if (!clock_.SleepUntil(deadline, stop)) return false;
     const Duration now = clock_.Steady();
     run.AddLateness(now - deadline);
+    CountCycle(now - deadline);
     // Cycles that were missed altogether are skipped; the path goes on by the time that passed.
     while (deadline + period <= now) deadline += period;
     const double elapsed_s = ToSeconds(deadline - before);
@@ -526,6 +556,14 @@ bool Executor::RunMotion(MotionRun& run, const std::stop_token& stop) {
     }
   }
   return true;
+}
+
+void Executor::CountCycle(Duration lateness) {
+  cycles_.fetch_add(1, std::memory_order_relaxed);
+  lateness_ns_.fetch_add(lateness.count(), std::memory_order_relaxed);
+  if (lateness.count() > lateness_max_ns_.load(std::memory_order_relaxed)) {
+    lateness_max_ns_.store(lateness.count(), std::memory_order_relaxed);
+  }
 }
 
 void Executor::WatchLoop(const std::stop_token& stop) {

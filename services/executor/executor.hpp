@@ -5,6 +5,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -21,6 +22,7 @@
 #include "exemplar/base/log.hpp"
 #include "exemplar/ircp/bus.hpp"
 #include "exemplar/ircp/control.hpp"
+#include "exemplar/ircp/metrics.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
 #include "exemplar/motion/plan.hpp"
 #include "exemplar/scene/description.hpp"
@@ -40,6 +42,20 @@ struct ExecutorOptions {
   double start_tolerance_rad = 0.05;
   WatchLimits watch = {};
   motion::PlanOptions plan = {};  ///< touch links and comfortable posture come from the robot
+};
+
+/// How it goes, since the executor began.
+struct ExecutorFigures {
+  std::string state;
+  double speed = 1;
+  std::map<std::string, std::uint64_t> executions;  ///< by the state they ended in
+  std::uint64_t plans_refused = 0;
+  std::uint64_t commands_dropped = 0;
+  std::uint64_t commands_failed = 0;
+  std::uint64_t cycles = 0;
+  double lateness_s = 0;  ///< summed over the cycles
+  double lateness_max_s = 0;
+  std::optional<double> state_age_s;  ///< of the last usable joint state
 };
 
 /// Thread-safe. The command over ircp/executor/command does the same as the methods: pause, resume,
@@ -68,6 +84,10 @@ class Executor final : public api::ExecutorApi {
   Status Stop() override;
   Status Reset() override;
   Status SetSpeed(double factor) override;
+
+  ExecutorFigures figures() const;
+  std::vector<ircp::TopicCount> sent() const;
+  std::vector<ircp::TopicReader> readers() const;
 
   /// Brings a motion to rest on its path and returns when it rests; nothing is executed afterwards.
   void Shutdown();
@@ -105,6 +125,7 @@ class Executor final : public api::ExecutorApi {
   void ControlLoop(const std::stop_token& stop);
   /// False when `stop` came first.
   bool RunMotion(MotionRun& run, const std::stop_token& stop);
+  void CountCycle(Duration lateness);
   void WatchLoop(const std::stop_token& stop);
   void PublishLoop(const std::stop_token& stop);
   void WakeAll();
@@ -119,6 +140,10 @@ class Executor final : public api::ExecutorApi {
   std::atomic<std::int64_t> state_received_ns_;
   std::atomic<double> speed_{1.0};
   std::atomic<State> state_{State::kIdle};  ///< written under mutex_
+  std::atomic<std::uint64_t> plans_refused_{0};
+  std::atomic<std::uint64_t> cycles_{0};  ///< these three are written by the control loop only
+  std::atomic<std::int64_t> lateness_ns_{0};
+  std::atomic<std::int64_t> lateness_max_ns_{0};
 
   mutable std::mutex mutex_;  ///< guards what follows
   std::condition_variable_any changed_;
@@ -132,6 +157,7 @@ class Executor final : public api::ExecutorApi {
   std::uint64_t beats_ = 0;  ///< a tenth of a second of motion each
   std::optional<Eigen::VectorXd> last_command_;
   std::deque<std::pair<State, std::string>> transitions_;
+  std::map<std::string, std::uint64_t> executions_;
   bool closing_ = false;
 
   std::unique_ptr<CommandStream> commands_;

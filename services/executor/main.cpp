@@ -1,6 +1,8 @@
 // exemplar-executor: carries skills out on a robot, checked for collisions, over DDS.
 
 #include "executor/executor.hpp"
+#include "executor/metrics.hpp"
+#include "executor/realtime.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
@@ -36,6 +38,9 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "executor");
+  if (!executor::LockMemory()) {
+    log->Info("memory is not locked", {{"advice", "raise the memlock limit to unlimited"}});
+  }
   const SystemClock clock;
   const auto robot = kinematics::ReadRobotDescription(robot_folder);
   if (!robot.ok()) return program::Fail(kName, robot.error());
@@ -59,6 +64,12 @@ int main(int argc, char** argv) {
        .on_call = [&calls](const rpc::CallRecord& call) { calls.Record(call); }},
       {.executor = app->get()});
   if (!server.ok()) return program::Fail(kName, server.error());
+  std::vector<Metric> figures = executor::MetricsOf(**app);
+  for (Metric& metric : rpc::MetricsOf(calls, "exemplar_executor")) {
+    figures.push_back(std::move(metric));
+  }
+  const auto metrics = program::ServeMetrics(options.common(), std::move(figures));
+  if (!metrics.ok()) return program::Fail(kName, metrics.error());
   log->Info("serving", {{"address", (*server)->address()}, {"robot", robot->name}});
 
   signals.Wait();

@@ -3,6 +3,7 @@
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
+#include "simulator/metrics.hpp"
 #include "simulator/session.hpp"
 
 int main(int argc, char** argv) {
@@ -50,6 +51,8 @@ int main(int argc, char** argv) {
   if (!participant) return program::Fail(kName, participant.error());
   auto session = simulator::Session::Create(**participant, clock, *log, *robot, *scene, settings);
   if (!session) return program::Fail(kName, session.error());
+  const auto metrics = program::ServeMetrics(options.common(), simulator::MetricsOf(**session));
+  if (!metrics) return program::Fail(kName, metrics.error());
   (*session)->Run(signals.token());
   return 0;
 }

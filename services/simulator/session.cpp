@@ -141,7 +141,11 @@ class RunningSession final : public Session {
         [this](const ircp::CommandSample& command) { return Obey(command); });
     if (!control) return control.error();
     control_ = std::move(control).value();
-    control_->SetSentCounts([this] { return SentCounts(); });
+    control_->SetSentCounts([this] { return sent(); });
+    control_->SetOnRival([this](const std::string& rival) {
+      log_.Warning("another simulator runs in this station: both send joint states",
+                   {{"writer", rival}});
+    });
     control_->SetValues([this] { return Values(); });
     control_->SetState("running", NameOf(Follower::Mode::kHolding));
 
@@ -174,7 +178,10 @@ class RunningSession final : public Session {
         const Duration lag = now - world_.time();
         begin += lag;
         epoch = epoch + lag;
-        ++slips_;
+        {
+          const std::lock_guard lock(mutex_);
+          ++slips_;
+        }
         log_.Warning("the world fell behind the clock", {{"by_s", ToSeconds(lag)}});
       }
       while (world_.time() + world_.step() <= clock_.Steady() - begin) Tick(epoch);
@@ -184,6 +191,41 @@ class RunningSession final : public Session {
     control_->SetState("stopped", "asked to stop");
     log_.Info("stopped", {{"sim_time_s", ToSeconds(world_.time())}});
   }
+
+  // ---- how it goes
+
+  Figures figures() const override {
+    Figures now;
+    {
+      const std::lock_guard lock(inbox_mutex_);
+      now.overrun = overrun_;
+    }
+    const std::lock_guard lock(mutex_);
+    now.time_s = ToSeconds(world_.time());
+    now.mode = NameOf(follower_.mode());
+    now.touch_n = world_.touch_n();
+    now.refused = refused_;
+    now.stale = static_cast<std::uint64_t>(follower_.stale_count());
+    now.slips = slips_;
+    now.faults = static_cast<std::uint64_t>(world_.faults());
+    now.states_dropped = states_->dropped();
+    now.pictures_skipped = cameras_ ? cameras_->skipped() : 0;
+    for (const ButtonState& button : world_.buttons()) now.clicks[button.name] = button.clicks;
+    return now;
+  }
+
+  std::vector<ircp::TopicCount> sent() const override {
+    std::vector<ircp::TopicCount> counts;
+    if (cameras_) counts = cameras_->sent();
+    counts.push_back({ircp::JointStateSample::kTopic, "robot", state_writer_->sent()});
+    return counts;
+  }
+
+  std::string leader_topic() const override {
+    return options_.leader == Leader::kSuit ? ircp::SuitSample::kTopic
+                                            : ircp::JointCommandSample::kTopic;
+  }
+  const ircp::Reader& leader_reader() const override { return *leader_reader_; }
 
  private:
   // ---- the loop
@@ -328,29 +370,20 @@ class RunningSession final : public Session {
     return {true, "placed", {{"pose", PoseText(*pose)}}};
   }
 
-  std::vector<ircp::TopicCount> SentCounts() const {
-    std::vector<ircp::TopicCount> counts;
-    if (cameras_) counts = cameras_->sent();
-    counts.push_back({ircp::JointStateSample::kTopic, "robot", state_writer_->sent()});
-    return counts;
-  }
-
   std::map<std::string, std::string> Values() const {
+    const Figures now = figures();
     std::map<std::string, std::string> values;
-    {
-      const std::lock_guard lock(inbox_mutex_);
-      values["samples_overrun"] = std::to_string(overrun_);
-    }
+    values["samples_overrun"] = std::to_string(now.overrun);
+    values["sim_time_s"] = FormatFixed(now.time_s, 3);
+    values["mode"] = now.mode;
+    values["touch_n"] = FormatFixed(now.touch_n, 3);
+    values["samples_refused"] = std::to_string(now.refused);
+    values["stale"] = std::to_string(now.stale);
+    values["slips"] = std::to_string(now.slips);
+    values["faults"] = std::to_string(now.faults);
+    values["states_dropped"] = std::to_string(now.states_dropped);
+    values["pictures_skipped"] = std::to_string(now.pictures_skipped);
     const std::lock_guard lock(mutex_);
-    values["sim_time_s"] = FormatFixed(ToSeconds(world_.time()), 3);
-    values["mode"] = NameOf(follower_.mode());
-    values["touch_n"] = FormatFixed(world_.touch_n(), 3);
-    values["samples_refused"] = std::to_string(refused_);
-    values["stale"] = std::to_string(follower_.stale_count());
-    values["slips"] = std::to_string(slips_);
-    values["faults"] = std::to_string(world_.faults());
-    values["states_dropped"] = std::to_string(states_->dropped());
-    values["pictures_skipped"] = std::to_string(cameras_ ? cameras_->skipped() : 0);
     for (const ButtonState& button : world_.buttons()) {
       values["clicks." + button.name] = std::to_string(button.clicks);
       values["position." + button.name] = PoseText(button.base_T_object);

@@ -2,8 +2,12 @@
 // The simulated robot as its neighbours on the network know it: it follows joint commands (or a
 // person's suit), says where its joints are and what its finger feels, shows what its cameras see.
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <stop_token>
+#include <string>
+#include <vector>
 
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
@@ -33,6 +37,21 @@ struct SessionOptions {
 /// Name of the touch sensor on ircp/joint_state: the sum over the robot's touch links.
 inline constexpr const char* kTouchSensor = "finger";
 
+/// How it goes.
+struct Figures {
+  double time_s = 0;  ///< simulated
+  std::string mode;   ///< "holding", "following", "going home"
+  double touch_n = 0;
+  std::map<std::string, std::uint64_t> clicks;  ///< by button
+  std::uint64_t refused = 0;                    ///< samples without sense for this robot
+  std::uint64_t overrun = 0;                    ///< samples dropped: they came too fast
+  std::uint64_t stale = 0;                      ///< times that samples stopped coming
+  std::uint64_t slips = 0;                      ///< times that the world fell behind the clock
+  std::uint64_t faults = 0;
+  std::uint64_t states_dropped = 0;
+  std::uint64_t pictures_skipped = 0;
+};
+
 /// Commands it answers (ircp/control.hpp, program "simulator"):
 ///   place{object, x, y [, z] [, qx, qy, qz, qw]}  what is left out stays as it is
 ///   home{}           back to the home posture at a gentle speed; the answer's `seconds` says when
@@ -49,6 +68,12 @@ class Session {
   virtual ~Session() = default;
   /// Steps the world in pace with the clock until `stop`. Call once.
   virtual void Run(std::stop_token stop) = 0;
+
+  // For metrics; thread-safe.
+  virtual Figures figures() const = 0;
+  virtual std::vector<ircp::TopicCount> sent() const = 0;
+  virtual std::string leader_topic() const = 0;
+  virtual const ircp::Reader& leader_reader() const = 0;
 };
 
 }  // namespace exemplar::simulator

@@ -42,6 +42,26 @@ TEST(SystemClockTest, ATimeThatHasPassedNeedsNoSleep) {
   EXPECT_TRUE(clock.SleepUntil(clock.Steady() - 1s, {}));
 }
 
+TEST(SystemClockTest, SleepsNoShorterThanAsked) {
+  const SystemClock clock;
+  std::stop_source stop;
+  for (const std::stop_token& token : {std::stop_token(), stop.get_token()}) {
+    const Duration until = clock.Steady() + 3ms;
+    EXPECT_TRUE(clock.SleepUntil(until, token));
+    EXPECT_GE(clock.Steady(), until);
+  }
+}
+
+TEST(SystemClockTest, AStopEndsASleepFromAnotherThread) {
+  const SystemClock clock;
+  std::stop_source stop;
+  std::atomic<bool> slept = true;
+  std::jthread sleeper([&] { slept = clock.SleepFor(1h, stop.get_token()); });
+  stop.request_stop();
+  sleeper.join();
+  EXPECT_FALSE(slept);
+}
+
 TEST(SystemClockTest, ARequestedStopIsSeenAtOnce) {
   std::stop_source stop;
   stop.request_stop();

@@ -200,6 +200,45 @@ TEST_F(ControlTest, ClientRepeatsWhatWasLostWithTheSameRequest) {
   EXPECT_EQ(done, 1);
 }
 
+TEST_F(ControlTest, TwoServersOfAProgramLearnOfEachOtherOnce) {
+  std::atomic<int> first_met = 0;
+  std::atomic<int> second_met = 0;
+  const auto first = Serve([](const CommandSample&) { return Answer{}; });
+  first->SetOnRival([&](const std::string&) { ++first_met; });
+  first->SetState("ready", "");
+  EXPECT_EQ(first_met, 0);  // not of itself
+  const auto second = Serve([](const CommandSample&) { return Answer{}; });
+  second->SetOnRival([&](const std::string&) { ++second_met; });
+  for (int i = 0; i < 3; ++i) {
+    first->SetState("ready", "");
+    second->SetState("ready", "");
+  }
+  EXPECT_EQ(first_met, 1);
+  EXPECT_EQ(second_met, 1);
+}
+
+TEST_F(ControlTest, AStopEndsAClientsWaiting) {
+  auto client = ControlClient::Create(bus_, clock_, "recorder", "cli", 1);
+  ASSERT_TRUE(client.ok());
+  std::stop_source stop;
+  auto call = std::async(std::launch::async, [&] {
+    return (*client)->Call("start", {}, std::chrono::hours(1), stop.get_token());
+  });
+  stop.request_stop();
+  const Result<Answer> answer = call.get();
+  ASSERT_FALSE(answer.ok());
+  EXPECT_EQ(answer.error().code, ErrorCode::kCancelled);
+}
+
+TEST_F(ControlTest, AnAnswerIsStillTakenAfterAStop) {
+  const auto server = Serve([](const CommandSample&) { return Answer{}; });
+  auto client = ControlClient::Create(bus_, clock_, "recorder", "cli", 1);
+  ASSERT_TRUE(client.ok());
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_TRUE((*client)->Call("stop", {}, std::chrono::hours(1), stop.get_token()).ok());
+}
+
 TEST_F(ControlTest, ClientSaysThatNobodyAnswers) {
   auto client = ControlClient::Create(bus_, clock_, "recorder", "cli", 1);
   ASSERT_TRUE(client.ok());

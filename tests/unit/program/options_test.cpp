@@ -57,6 +57,19 @@ TEST_F(OptionsTest, AnUnknownNameInTheFileIsRefused) {
   EXPECT_NE(testing::internal::GetCapturedStderr().find("statoin"), std::string::npos);
 }
 
+TEST_F(OptionsTest, ASlipOfTheHandIsToldTheNearestName) {
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(Parse(options_, {"--config", WriteConfig("domain: 3\nstatoin: lab\n")}), 2);
+  std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("line 2: there is no option \"statoin\"; did you mean station?"),
+            std::string::npos)
+      << said;
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(Parse(options_, {"--staton=lab"}), 2);
+  said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("did you mean --station?"), std::string::npos) << said;
+}
+
 TEST_F(OptionsTest, BrokenYamlNamesItsLine) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(Parse(options_, {"--config", WriteConfig("domain: 1\nstation: [a\n")}), 2);

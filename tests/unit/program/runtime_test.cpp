@@ -47,6 +47,18 @@ TEST(MetricsServerTest, ServesWhatItsMetricsSayNow) {
   EXPECT_THAT(Get((*server)->port(), "/secret"), testing::HasSubstr("404"));
 }
 
+TEST(MetricsServerTest, IsLeftOutWhereNoAddressIsGiven) {
+  const auto none = ServeMetrics({}, {});
+  ASSERT_TRUE(none.ok());
+  EXPECT_EQ(*none, nullptr);
+  CommonOptions options;
+  options.metrics = "127.0.0.1:0";
+  const auto served = ServeMetrics(
+      options, {GaugeOf("exemplar_speed_ratio", "share of full speed", [] { return 0.5; })});
+  ASSERT_TRUE(served.ok());
+  EXPECT_THAT(Get((*served)->port(), "/metrics"), testing::HasSubstr("exemplar_speed_ratio 0.5"));
+}
+
 TEST(MetricsServerTest, RefusesAnAddressThatIsNone) {
   const auto server = MetricsServer::Create("nowhere", {});
   ASSERT_FALSE(server.ok());

@@ -12,6 +12,7 @@ namespace {
 
 constexpr Duration kRepeatPeriod = std::chrono::seconds(1);
 constexpr Duration kMatchPeriod = std::chrono::milliseconds(10);
+constexpr Duration kLastPatience = std::chrono::milliseconds(500);
 
 /// Two runs of a program with one seed must not repeat each other's request ids: the server would
 /// take the second run's commands for repetitions of the first's.
@@ -39,7 +40,7 @@ class Client final : public ControlClient {
   }
 
   Result<Answer> Call(const std::string& action, std::map<std::string, std::string> arguments,
-                      Duration timeout) override {
+                      Duration timeout, std::stop_token stop) override {
     Pending pending;
     CommandSample command;
     command.program = program_;
@@ -51,7 +52,7 @@ class Client final : public ControlClient {
       command.request_id = MakeId("request", rng_);
       pending_[command.request_id] = &pending;
     }
-    const Result<Answer> answer = Ask(command, pending, clock_.Steady() + timeout);
+    const Result<Answer> answer = Ask(command, pending, clock_.Steady() + timeout, stop);
     const std::lock_guard lock(mutex_);
     pending_.erase(command.request_id);
     return answer;
@@ -63,19 +64,36 @@ class Client final : public ControlClient {
     std::stop_source answered;
   };
 
-  Result<Answer> Ask(const CommandSample& command, const Pending& pending, Duration deadline) {
+  Error Cancelled(const CommandSample& command) const {
+    return {ErrorCode::kCancelled,
+            "stopped before " + program_ + " had answered \"" + command.action + '"'};
+  }
+
+  Result<Answer> Ask(const CommandSample& command, const Pending& pending, Duration deadline,
+                     const std::stop_token& stop) {
     // Commands are volatile: what nobody reads yet is gone.
     while (writer_->matched_readers() == 0) {
       if (clock_.Steady() >= deadline) {
         return Unavailable("nobody listens on " + CommandTopic(program_) + ": is " + program_ +
                            " running in this station?");
       }
-      clock_.SleepUntil(std::min(deadline, clock_.Steady() + kMatchPeriod), {});
+      if (!clock_.SleepUntil(std::min(deadline, clock_.Steady() + kMatchPeriod), stop)) {
+        return Cancelled(command);
+      }
     }
+    std::stop_source wake;
+    const auto ring = [&wake] { wake.request_stop(); };
+    const std::stop_callback on_answer(pending.answered.get_token(), ring);
+    const std::stop_callback on_stop(stop, ring);
+    bool hurried = false;
     while (true) {
+      if (!hurried && stop.stop_requested()) {
+        hurried = true;
+        deadline = std::min(deadline, clock_.Steady() + kLastPatience);
+      }
       if (Status sent = writer_->Write(command); !sent) return sent.error();
       const Duration next = std::min(deadline, clock_.Steady() + kRepeatPeriod);
-      clock_.SleepUntil(next, pending.answered.get_token());
+      clock_.SleepUntil(next, hurried ? pending.answered.get_token() : wake.get_token());
       {
         const std::lock_guard lock(mutex_);
         if (pending.answer) {
@@ -84,6 +102,7 @@ class Client final : public ControlClient {
         }
       }
       if (clock_.Steady() >= deadline) {
+        if (stop.stop_requested()) return Cancelled(command);
         return Unavailable(program_ + " did not answer \"" + command.action + "\" on " +
                            StatusTopic(program_) + " in time");
       }

@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "exemplar/base/ids.hpp"
+#include "exemplar/base/rng.hpp"
 #include "exemplar/ircp/control.hpp"
 
 namespace exemplar::ircp {
@@ -13,7 +15,11 @@ namespace {
 
 constexpr std::size_t kAnswersKept = 256;
 constexpr std::size_t kLongestQueue = 64;
+constexpr std::size_t kRivalsKept = 64;
 constexpr Duration kStatusPeriod = std::chrono::seconds(1);
+
+/// In the values of each status: tells one server of a program from another.
+constexpr const char* kInstance = "instance";
 
 struct Received {
   CommandSample command;
@@ -24,9 +30,14 @@ struct Received {
 class Server final : public ControlServer {
  public:
   Server(const Clock& clock, std::string program, Handler handler)
-      : clock_(clock), program_(std::move(program)), handler_(std::move(handler)) {}
+      : clock_(clock), program_(std::move(program)), handler_(std::move(handler)) {
+    Rng rng(static_cast<std::uint64_t>(clock.Now().nanoseconds()) ^
+            reinterpret_cast<std::uintptr_t>(this));
+    instance_ = MakeId("instance", rng);
+  }
 
   ~Server() override {
+    others_.reset();
     reader_.reset();  // no command comes any more
     heartbeat_ = {};
     worker_ = {};
@@ -41,6 +52,11 @@ class Server final : public ControlServer {
         [this](const CommandSample& command, const Reception&) { Take(command); });
     if (!reader) return reader.error();
     reader_ = std::move(*reader);
+    auto others = bus.MakeReaderOn<StatusSample>(
+        StatusTopic(program_),
+        [this](const StatusSample& status, const Reception& from) { Meet(status, from); });
+    if (!others) return others.error();
+    others_ = std::move(*others);
     worker_ = std::jthread([this](const std::stop_token& stop) { Work(stop); });
     heartbeat_ = std::jthread([this](const std::stop_token& stop) {
       do {
@@ -69,7 +85,31 @@ class Server final : public ControlServer {
     values_ = std::move(values);
   }
 
+  void SetOnRival(std::function<void(const std::string&)> on_rival) override {
+    std::set<std::string> met;
+    {
+      const std::lock_guard lock(mutex_);
+      on_rival_ = on_rival;
+      met = rivals_;
+    }
+    for (const std::string& writer : met) on_rival(writer);
+  }
+
  private:
+  /// On a thread of the network: a status of this program, ours or another's.
+  void Meet(const StatusSample& status, const Reception& from) {
+    const auto other = status.values.find(kInstance);
+    if (other == status.values.end() || other->second == instance_) return;
+    if (status.state == "stopped") return;
+    std::function<void(const std::string&)> on_rival;
+    {
+      const std::lock_guard lock(mutex_);
+      if (rivals_.size() >= kRivalsKept || !rivals_.insert(from.writer).second) return;
+      on_rival = on_rival_;
+    }
+    if (on_rival) on_rival(from.writer);
+  }
+
   /// On a thread of the network: only hands over.
   void Take(const CommandSample& command) {
     if (command.program != program_) return;
@@ -141,6 +181,7 @@ class Server final : public ControlServer {
     // Asked without our lock: they may take locks of their own.
     if (counts) status.sent = counts();
     if (values) status.values = values();
+    status.values[kInstance] = instance_;
     if (answer) {
       status.request_id = request_id;
       status.ok = answer->ok;
@@ -154,6 +195,7 @@ class Server final : public ControlServer {
   const Clock& clock_;
   const std::string program_;
   const Handler handler_;
+  std::string instance_;
 
   std::mutex mutex_;
   std::condition_variable_any arrived_;
@@ -167,7 +209,11 @@ class Server final : public ControlServer {
   std::function<std::map<std::string, std::string>()> values_;
 
   std::unique_ptr<Writer<StatusSample>> writer_;
+  std::function<void(const std::string&)> on_rival_;
+  std::set<std::string> rivals_;  ///< their writers
+
   std::unique_ptr<Reader> reader_;
+  std::unique_ptr<Reader> others_;
   std::jthread worker_;
   std::jthread heartbeat_;
 };

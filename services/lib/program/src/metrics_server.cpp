@@ -61,9 +61,13 @@ std::string Serialize(const std::vector<Metric>& metrics) {
 
 bool ReadHead(int fd, std::string& head) {
   char buffer[1024];
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::milliseconds(kRequestTimeoutMs);
   while (head.find("\r\n") == std::string::npos && head.size() < kLongestRequest) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        deadline - std::chrono::steady_clock::now());
     pollfd ready{fd, POLLIN, 0};
-    if (poll(&ready, 1, kRequestTimeoutMs) <= 0) return false;
+    if (left.count() <= 0 || poll(&ready, 1, static_cast<int>(left.count())) <= 0) return false;
     const ssize_t n = recv(fd, buffer, sizeof buffer, 0);
     if (n <= 0) return false;
     head.append(buffer, static_cast<std::size_t>(n));
@@ -159,6 +163,12 @@ Result<std::unique_ptr<MetricsServer>> MetricsServer::Create(const std::string& 
                                         : reinterpret_cast<const sockaddr_in&>(local).sin_port);
   return std::unique_ptr<MetricsServer>(
       std::make_unique<SocketMetricsServer>(std::move(listener), actual, std::move(metrics)));
+}
+
+Result<std::unique_ptr<MetricsServer>> ServeMetrics(const CommonOptions& options,
+                                                    std::vector<Metric> metrics) {
+  if (options.metrics.empty()) return std::unique_ptr<MetricsServer>();
+  return MetricsServer::Create(options.metrics, std::move(metrics));
 }
 
 }  // namespace exemplar::program

@@ -3,17 +3,35 @@
 #include <yaml-cpp/yaml.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <utility>
 
+#include "exemplar/base/text.hpp"
 #include "exemplar/program/runtime.hpp"
 
 namespace exemplar::program {
 namespace {
 
+/// The options' names without dashes, as a configuration file has them.
+std::vector<std::string> Names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back(name);
+  }
+  return names;
+}
+
+std::string Suggestion(const std::string& name, const CLI::App& app, const std::string& dashes) {
+  const std::optional<std::string> near = NearestName(name, Names(app));
+  return near ? "; did you mean " + dashes + *near + '?' : std::string();
+}
+
 /// Lets CLI11 read YAML: a map of option names to scalars or lists of scalars.
 class YamlConfig final : public CLI::Config {
  public:
+  explicit YamlConfig(const CLI::App& app) : app_(app) {}
+
   std::string to_config(const CLI::App*, bool, bool, std::string) const override { return {}; }
 
   std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
@@ -30,6 +48,10 @@ class YamlConfig final : public CLI::Config {
       CLI::ConfigItem item;
       item.name = entry.first.as<std::string>();
       const int line = entry.first.Mark().line + 1;
+      if (!IsOption(item.name)) {
+        throw CLI::ConfigError("line " + std::to_string(line) + ": there is no option \"" +
+                               item.name + '"' + Suggestion(item.name, app_, ""));
+      }
       if (entry.second.IsScalar()) {
         item.inputs = {entry.second.Scalar()};
       } else if (entry.second.IsSequence()) {
@@ -46,18 +68,27 @@ class YamlConfig final : public CLI::Config {
   }
 
  private:
+  bool IsOption(const std::string& name) const {
+    const std::vector<std::string> names = Names(app_);
+    return std::find(names.begin(), names.end(), name) != names.end();
+  }
+
   [[noreturn]] static void Refuse(int line, const std::string& name) {
     throw CLI::ConfigError("line " + std::to_string(line) + ": " + name +
                            " must be a value or a list of values");
   }
+
+  const CLI::App& app_;
 };
 
 }  // namespace
 
 struct Options::Impl {
-  Impl(const std::string& name, std::string summary, std::string footer)
+  Impl(const std::string& name, std::string summary, const std::string& footer)
       : program(name), app(std::move(summary), name) {
-    app.footer(std::move(footer));
+    app.footer("Examples:\n" + footer +
+               "\n\nExit codes: 0 done, 2 usage, 3 not found, 4 refused, 5 unavailable, 1 anything "
+               "else.");
     app.get_formatter()->column_width(34);
     app.option_defaults()->always_capture_default();
   }
@@ -69,10 +100,10 @@ struct Options::Impl {
 };
 
 Options::Options(std::string program, std::string summary, std::string footer, Roles roles)
-    : impl_(std::make_unique<Impl>(program, std::move(summary), std::move(footer))) {
+    : impl_(std::make_unique<Impl>(program, std::move(summary), footer)) {
   CLI::App& app = impl_->app;
   CommonOptions& common = impl_->common;
-  app.config_formatter(std::make_shared<YamlConfig>());
+  app.config_formatter(std::make_shared<YamlConfig>(app));
   app.set_config("--config", "", "YAML file with any of these options; flags override it");
   app.allow_config_extras(CLI::config_extras_mode::error);
   app.set_version_flag("--version", std::string(Version()));
@@ -131,6 +162,11 @@ Options& Options::MinMax(double least, double greatest) {
 
 CommonOptions& Options::common() { return impl_->common; }
 
+int Options::Refuse(const std::string& what) const {
+  std::cerr << impl_->program << ": " << what << "\nTry '" << impl_->program << " --help'.\n";
+  return 2;
+}
+
 std::optional<int> Options::Parse(int argc, char** argv) {
   try {
     impl_->app.parse(argc, argv);
@@ -140,9 +176,17 @@ std::optional<int> Options::Parse(int argc, char** argv) {
   } catch (const CLI::CallForVersion&) {
     std::cout << impl_->program << ' ' << Version() << '\n';
     return 0;
+  } catch (const CLI::ConfigError& e) {
+    return Refuse("--config " + impl_->app.get_config_ptr()->as<std::string>() + ": " + e.what());
   } catch (const CLI::ParseError& e) {
-    std::cerr << impl_->program << ": " << e.what() << "\nTry '" << impl_->program << " --help'.\n";
-    return 2;
+    // A slip of the hand is often why something else is missing: it is said first.
+    const std::vector<std::string> unknown = impl_->app.remaining();
+    if (unknown.empty()) return Refuse(e.what());
+    const std::string& word = unknown.front();
+    const std::size_t dashes = std::min(word.size(), word.find_first_not_of('-'));
+    const std::string name = word.substr(dashes, word.find('=') - dashes);
+    return Refuse('"' + word + "\" is not expected" +
+                  (dashes > 0 ? Suggestion(name, impl_->app, "--") : std::string()));
   }
   return std::nullopt;
 }

@@ -25,7 +25,7 @@ class Clock {
   }
 };
 
-/// The machine's clocks.
+/// The machine's clocks. SleepUntil does not allocate and does not spin.
 class SystemClock final : public Clock {
  public:
   Stamp Now() const override;

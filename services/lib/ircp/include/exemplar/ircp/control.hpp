@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "exemplar/base/clock.hpp"
@@ -31,6 +32,9 @@ class ControlServer {
   /// Asked whenever a status goes out.
   virtual void SetSentCounts(std::function<std::vector<TopicCount>()> counts) = 0;
   virtual void SetValues(std::function<std::map<std::string, std::string>()> values) = 0;
+  /// Told once of each other server of the same program that is seen in this station, by its place
+  /// on the network: two would answer the same commands. On a thread of the network.
+  virtual void SetOnRival(std::function<void(const std::string& writer)> on_rival) = 0;
 };
 
 /// The asking side.
@@ -41,9 +45,11 @@ class ControlClient {
                                                        std::uint64_t seed);
   virtual ~ControlClient() = default;
   /// Sends, repeats every second with the same request id, returns the answer. kUnavailable: nobody
-  /// answered in time; kFailedPrecondition: the answer was no.
+  /// answered in time; kFailedPrecondition: the answer was no. After `stop` the answer to what was
+  /// sent is waited for half a second longer; kCancelled when it did not come.
   virtual Result<Answer> Call(const std::string& action,
-                              std::map<std::string, std::string> arguments, Duration timeout) = 0;
+                              std::map<std::string, std::string> arguments, Duration timeout,
+                              std::stop_token stop = {}) = 0;
 };
 
 }  // namespace exemplar::ircp

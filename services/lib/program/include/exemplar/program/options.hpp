@@ -53,6 +53,8 @@ class Options {
   /// The exit code when the program is done already (--help, --version: 0; bad usage: 2, said on
   /// stderr).
   std::optional<int> Parse(int argc, char** argv);
+  /// Says on stderr what is wrong with the usage; the exit code for that, 2.
+  int Refuse(const std::string& what) const;
 
  private:
   struct Impl;

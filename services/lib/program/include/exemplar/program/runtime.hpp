@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "exemplar/base/log.hpp"
+#include "exemplar/base/metric.hpp"
 #include "exemplar/base/result.hpp"
 #include "exemplar/program/options.hpp"
 
@@ -35,17 +36,7 @@ class Signals {
   std::unique_ptr<Impl> impl_;
 };
 
-/// One figure for Prometheus, asked for at each scrape.
-struct Metric {
-  std::string name;  ///< "exemplar_recorder_messages_total"
-  std::string help;
-  bool counter = false;  ///< else a gauge
-  struct Value {
-    std::vector<std::pair<std::string, std::string>> labels;
-    double value = 0;
-  };
-  std::function<std::vector<Value>()> values;
-};
+using exemplar::Metric;
 
 /// Serves GET /metrics and /healthz on HOST:PORT until destroyed. Thread-safe.
 class MetricsServer {
@@ -55,6 +46,10 @@ class MetricsServer {
   virtual ~MetricsServer() = default;
   virtual int port() const = 0;
 };
+
+/// The server of --metrics; null where the option is empty. Destroy it before what `metrics` ask.
+Result<std::unique_ptr<MetricsServer>> ServeMetrics(const CommonOptions& options,
+                                                    std::vector<Metric> metrics);
 
 /// Prints "PROGRAM: message" to stderr and returns the exit code for the error.
 int Fail(const std::string& program, const Error& error);

@@ -1,0 +1,59 @@
+#include "capture_suit/capture.hpp"
+
+#include <utility>
+
+#include "exemplar/ircp/metrics.hpp"
+
+namespace exemplar::capture_suit {
+namespace {
+
+template <class Made>
+Result<std::unique_ptr<Session>> AsSession(Result<std::unique_ptr<Made>> made) {
+  if (!made) return made.error();
+  return std::unique_ptr<Session>(std::move(*made));
+}
+
+}  // namespace
+
+Status CheckUsage(const CaptureOptions& options) {
+  if (options.person == !options.replay.empty()) {
+    return InvalidArgument("give --replay FILE... or --person, one of them");
+  }
+  if (!options.person) return {};
+  if (options.robot_folder.empty()) return InvalidArgument("--person needs --robot", "robot");
+  if (options.scene_file.empty()) return InvalidArgument("--person needs --scene", "scene");
+  return {};
+}
+
+Result<std::unique_ptr<Session>> MakeSession(ircp::Bus& bus, const Clock& clock, Log& log,
+                                             const CaptureOptions& options) {
+  if (options.person) {
+    const auto robot = kinematics::ReadRobotDescription(options.robot_folder);
+    if (!robot) return robot.error();
+    const auto scene = scene::ReadDescription(options.scene_file);
+    if (!scene) return scene.error();
+    PersonSessionOptions performing = options.performing;
+    performing.record = options.record;
+    performing.name = options.name;
+    performing.person.seed = static_cast<std::uint64_t>(options.seed);
+    return AsSession(PersonSession::Create(bus, clock, log, *robot, *scene, performing));
+  }
+  std::vector<demonstration::Trial> trials;
+  for (const std::string& file : options.replay) {
+    Result<demonstration::Trial> trial = ReadTrialFile(file);
+    if (!trial) return trial.error();
+    trials.push_back(std::move(*trial));
+  }
+  ReplayOptions replaying = options.replaying;
+  replaying.record = options.record;
+  replaying.name = options.name;
+  return AsSession(ReplaySession::Create(bus, clock, log, std::move(trials), replaying));
+}
+
+std::vector<Metric> MetricsOf(const Session& session) {
+  return {ircp::SentMetric("exemplar_capture_suit", [&session] { return session.sent(); }),
+          CounterOf("exemplar_capture_suit_trials_total", "Trials sent to their end",
+                    [&session] { return session.trials_ended(); })};
+}
+
+}  // namespace exemplar::capture_suit

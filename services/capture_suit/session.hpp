@@ -1,0 +1,22 @@
+#pragma once
+#include <cstdint>
+#include <stop_token>
+#include <vector>
+
+#include "exemplar/base/result.hpp"
+#include "exemplar/ircp/samples.hpp"
+
+namespace exemplar::capture_suit {
+
+/// Trials, one after the other, onto the topics. Run on one thread; the rest is thread-safe.
+class Session {
+ public:
+  virtual ~Session() = default;
+  /// Ends after the last trial, at the first error, or soon after `stop` (kCancelled; a recording
+  /// that runs is stopped first).
+  virtual Status Run(std::stop_token stop) = 0;
+  virtual std::vector<ircp::TopicCount> sent() const = 0;
+  virtual std::uint64_t trials_ended() const = 0;
+};
+
+}  // namespace exemplar::capture_suit
