@@ -18,6 +18,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import xml.etree.ElementTree
 
 BINARIES = pathlib.Path(os.environ["EXEMPLAR_BIN"])
 DONE, OTHER, USAGE, NOT_FOUND, REFUSED, UNAVAILABLE = 0, 1, 2, 3, 4, 5
@@ -260,6 +261,25 @@ class ServiceTest(unittest.TestCase):
         report = self.json("skill", "show", "press", "--version", 1)
         self.assertEqual([trial["id"] for trial in report["trials"]], self.ids)
         self.assertGreater(len(report["methods"]), 1)
+
+    def test_figures_are_written_with_an_index(self):
+        folder = self.folder / "new" / "figures"
+        done = self.exemplar("skill", "show", "press", "--figures", folder)
+        self.assertEqual(done.returncode, DONE, done.stderr)
+        names = [f"figure-{number:02d}.svg" for number in range(4, 15)]
+        self.assertEqual(sorted(path.name for path in folder.iterdir()), [*names, "index.html"])
+        index = (folder / "index.html").read_text(encoding="utf-8")
+        for name in names:
+            root = xml.etree.ElementTree.parse(folder / name).getroot()
+            self.assertEqual(root.tag, "{http://www.w3.org/2000/svg}svg")
+            self.assertIn(str(folder / name), done.stdout)
+            self.assertIn(f'src="{name}"', index)
+        as_json = self.exemplar("skill", "show", "press", "--figures", folder, "--format", "json")
+        self.assertEqual(json.loads(as_json.stdout)["skill"], "press")
+        self.assertIn("index.html", as_json.stderr)
+        taken = self.exemplar("skill", "show", "press", "--figures", self.files[0])
+        self.assertEqual(taken.returncode, REFUSED)
+        self.assertIn("press0.csv", taken.stderr)
 
     def test_a_query_in_csv_has_the_contracts_columns(self):
         done = self.exemplar("skill", "query", "press", "--object", "button=0.55,-0.1,0.05")

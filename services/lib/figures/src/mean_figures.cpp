@@ -169,9 +169,9 @@ Figure AlignedPaths(const Subject& subject) {
           .title = kTitle,
           .svg = page.ToSvg(),
           .caption =
-              "Position of the end effector in the robot's base frame. The aligned mean "
-              "reaches the extremes that the trials have; the plain mean blurs what happens "
-              "at different times in different trials."};
+              "Position of the end effector in the robot's base frame. The plain mean blurs "
+              "what happens at different times in different trials; the aligned mean keeps "
+              "it."};
 }
 
 }  // namespace exemplar::figures

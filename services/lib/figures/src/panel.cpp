@@ -153,7 +153,9 @@ void Panel::DrawHeat(Svg& svg) const {
       const Point low = At(map_->x[c] - half_x, map_->y[r] - half_y);
       const Point high = At(map_->x[c] + half_x, map_->y[r] + half_y);
       const double value = map_->values(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
-      svg.Cell({low.x, high.y, high.x - low.x, low.y - high.y}, HeatColour(value / map_->full));
+      // A little over the next cell, which is drawn later: no seam.
+      svg.Cell({low.x, high.y - 0.6, high.x - low.x + 0.6, low.y - high.y + 0.6},
+               HeatColour(value / map_->full));
     }
   }
 }

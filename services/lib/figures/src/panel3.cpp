@@ -53,7 +53,7 @@ class Projection {
 };
 
 std::vector<double> AxisTicks(double low, double high, double scale) {
-  return Ticks(low, high, std::clamp(static_cast<int>((high - low) * scale / 44), 2, 7));
+  return Ticks(low, high, std::clamp(static_cast<int>((high - low) * scale / 36), 3, 7));
 }
 
 double StepOf(const std::vector<double>& ticks) {

@@ -62,8 +62,23 @@ double Miss(const Subject& subject, const Eigen::MatrixXd& path) {
 
 std::string SameSolutionsNote(const Inspection& inspection) {
   if (inspection.through_joints) return {};
-  return " These trials have no joints, so the absolute solution is an RBF on the paths "
-         "themselves, which the objective one repeats: the paper's blend changes nothing here.";
+  const std::string plain =
+      " There is no joint-wise solution (no joints, or no robot model), so the absolute one is an "
+      "RBF on the paths themselves";
+  const learning::InspectedQuery& query = *inspection.query;
+  const bool same = (query.absolute - query.objective).cwiseAbs().maxCoeff() < 1e-6;
+  return plain + (same
+                      ? ", which the objective one repeats: the paper's blend changes nothing."
+                      : "; it differs from the objective one only because the objects' places lie "
+                        "in a plane or a line, so that their trend does not cover all directions.");
+}
+
+Eigen::Vector3d MeanStart(const Inspection& inspection) {
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();
+  for (const Eigen::MatrixXd& path : inspection.base_paths) {
+    start += RowOf(path, 0) / static_cast<double>(inspection.base_paths.size());
+  }
+  return start;
 }
 
 }  // namespace
@@ -99,8 +114,9 @@ Figure ContactErrors(const Subject& subject) {
   std::string figures;
   for (std::size_t k = 0; k < sides.size(); ++k) {
     const Rect box{kLeft + static_cast<double>(k) * (width + kBetween), Page::kTop, width, height};
-    Panel& panel = page.Add<Panel>(
-        box, PanelText{.title = sides[k].title, .x = "object x in m", .y = "object y in m"});
+    Panel& panel = page.Add<Panel>(box, PanelText{.title = sides[k].title,
+                                                  .x = "object x in m",
+                                                  .y = k == 0 ? "object y in m" : ""});
     panel.Heat(map.x_m, map.y_m, *sides[k].values * unit, full);
     std::vector<Point> places;
     for (const geometry::Pose& target : inspection.base_T_target) {
@@ -119,8 +135,8 @@ Figure ContactErrors(const Subject& subject) {
       " m turned as on average. Over this map: " + figures + ".";
   if (!inspection.through_joints) {
     caption +=
-        " The trials have no joints (or the service has no robot model), so there is no "
-        "joint-wise solution; the plain RBF on paths stands in its place.";
+        " There is no joint-wise solution (no joints, or no robot model): the plain RBF on "
+        "paths stands in its place.";
   }
   caption +=
       " What remains at the trials themselves is how differently people touched the object, "
@@ -133,9 +149,9 @@ Figure TwoFrames(const Subject& subject) {
   const Inspection& inspection = subject.inspection;
   if (inspection.object_paths.empty()) return CannotDraw(11, kTitle, inspection.obstacle);
   Page page(Heading(11, kTitle));
-  Panel3& base = page.Add<Panel3>(Rect{10, Page::kTop, 485, 430}, "absolute coordinates", "m");
+  Panel3& base = page.Add<Panel3>(Rect{24, Page::kTop, 475, 400}, "absolute coordinates", "m");
   Panel3& object =
-      page.Add<Panel3>(Rect{505, Page::kTop, 485, 430}, "object coordinates (x - O)", "m");
+      page.Add<Panel3>(Rect{515, Page::kTop, 475, 400}, "object coordinates (x - O)", "m");
   for (std::size_t j = 0; j < inspection.base_paths.size(); ++j) {
     const Stroke stroke{.colour = TrialColour(j), .width = 1.6, .opacity = 0.85};
     base.Path(inspection.base_paths[j], stroke);
@@ -154,8 +170,8 @@ Figure TwoFrames(const Subject& subject) {
           .svg = page.ToSvg(),
           .caption =
               "The end effector's paths, aligned in time; shadows lie on the floor. In the "
-              "robot's coordinates they start together and diverge; in the object's "
-              "coordinates (shifted, not turned) they start apart and converge."};
+              "robot's coordinates they diverge towards the objects' places; in the object's "
+              "coordinates (shifted, not turned) they converge."};
 }
 
 Figure ObjectivityOverTime(const Subject& subject) {
@@ -221,13 +237,12 @@ Figure TwoSolutions(const Subject& subject) {
           .title = kTitle,
           .svg = page.ToSvg(),
           .caption = "Answers for an object at " + PlaceText(query) +
-                     ", by the paper's two "
-                     "solutions. " +
-                     "At contact the absolute one is " +
+                     ", by the paper's two solutions. At contact the absolute one is " +
                      Centimetres(Miss(subject, query.absolute)) + " off, the objective one " +
-                     Centimetres(Miss(subject, query.objective)) + "; they start " +
-                     Centimetres((RowOf(query.absolute, 0) - RowOf(query.objective, 0)).norm()) +
-                     " apart, the absolute one where the trials did." +
+                     Centimetres(Miss(subject, query.objective)) + "; the one starts " +
+                     Centimetres((RowOf(query.absolute, 0) - MeanStart(inspection)).norm()) +
+                     " from the trials' mean start, the other " +
+                     Centimetres((RowOf(query.objective, 0) - MeanStart(inspection)).norm()) + "." +
                      SameSolutionsNote(inspection)};
 }
 

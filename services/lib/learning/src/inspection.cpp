@@ -18,6 +18,11 @@ std::string ObstacleOf(const Exemplars& exemplars) {
   return {};
 }
 
+Eigen::Vector3d PointAt(const ContactPoint& contact, const geometry::Pose& base_T_target) {
+  return contact.turns ? base_T_target * contact.object_p_contact
+                       : base_T_target.translation + contact.object_p_contact;
+}
+
 // The paper's method on the skill's trials, whatever method the skill itself uses.
 class PaperView {
  public:
@@ -72,8 +77,7 @@ class PaperView {
   }
 
   Eigen::Vector3d ContactPointAt(const geometry::Pose& base_T_target) const {
-    return contact_.turns ? base_T_target * contact_.object_p_contact
-                          : base_T_target.translation + contact_.object_p_contact;
+    return PointAt(contact_, base_T_target);
   }
 
   Situation SituationOf(const demonstration::SkillQuery& query) const {
@@ -126,9 +130,9 @@ class PaperView {
     if (!contact_found_) {
       Eigen::Index frame = 0;
       objectivity_.upsilon.maxCoeff(&frame);
-      span.first = span.last = static_cast<int>(frame);
+      span.first = span.last = span.meets = static_cast<int>(frame);
     }
-    contact_frame_ = span.first;
+    contact_frame_ = span.meets;
     contact_ = MeanContactPoint(exemplars_, span);
   }
 
@@ -216,11 +220,20 @@ std::vector<double> Spread(double low, double high, int count) {
   return values;
 }
 
-// Where the skill's own answer meets the target first, in its own alignment.
-int AnswerFrame(const Skill& skill, const PaperView& view) {
-  const std::optional<int> frame =
-      skill.data().exemplars->FirstContact(skill.data().exemplars->target);
-  return frame.value_or(view.contact_frame());
+// Where the skill's own answer meets the target first: its alignment is not the paper's.
+struct AnswerContact {
+  std::size_t frame = 0;
+  std::optional<ContactPoint> point;  // nullopt: as the paper's
+};
+
+AnswerContact FindAnswerContact(const Skill& skill, const PaperView& view) {
+  const Skill::Data& data = skill.data();
+  for (std::size_t k = 0; k < data.exemplars->contacts.size(); ++k) {
+    const ContactSpan& contact = data.exemplars->contacts[k];
+    if (contact.object != data.exemplars->target) continue;
+    return {static_cast<std::size_t>(contact.first), data.contact_points[k]};
+  }
+  return {static_cast<std::size_t>(view.contact_frame()), std::nullopt};
 }
 
 ContactErrorMap MapErrors(const Skill& skill, const PaperView& view,
@@ -235,14 +248,15 @@ ContactErrorMap MapErrors(const Skill& skill, const PaperView& view,
   const auto columns = static_cast<Eigen::Index>(map.x_m.size());
   map.absolute = map.blended = map.answer = Eigen::MatrixXd::Zero(rows, columns);
   const bool paper = skill.report().method == "paper";
-  const auto frame = static_cast<std::size_t>(AnswerFrame(skill, view));
+  const AnswerContact answer = FindAnswerContact(skill, view);
   for (Eigen::Index r = 0; r < rows; ++r) {
     for (Eigen::Index c = 0; c < columns; ++c) {
       const Eigen::Vector3d position(map.x_m[static_cast<std::size_t>(c)],
                                      map.y_m[static_cast<std::size_t>(r)], map.z_m);
       const demonstration::SkillQuery query = view.QueryAt(position);
-      const Eigen::Vector3d contact = view.ContactPointAt(
-          query.objects[static_cast<std::size_t>(view.exemplars().target)].base_T_object);
+      const geometry::Pose& target =
+          query.objects[static_cast<std::size_t>(view.exemplars().target)].base_T_object;
+      const Eigen::Vector3d contact = view.ContactPointAt(target);
       const Eigen::VectorXd weights = view.Weights(position);
       const Eigen::Vector3d absolute = view.AbsoluteAtContact(weights);
       const Eigen::Vector3d blended = view.BlendedAtContact(weights, position, absolute);
@@ -251,7 +265,9 @@ ContactErrorMap MapErrors(const Skill& skill, const PaperView& view,
       map.answer(r, c) = map.blended(r, c);
       if (paper) continue;
       if (const auto motion = Answer(skill, query)) {
-        map.answer(r, c) = (motion->base_T_tool[frame].translation - contact).norm();
+        const Eigen::Vector3d tool = motion->base_T_tool[answer.frame].translation;
+        map.answer(r, c) =
+            (tool - (answer.point ? PointAt(*answer.point, target) : contact)).norm();
       }
     }
   }

@@ -41,7 +41,9 @@ struct InspectedQuery {
   Eigen::MatrixXd answer;     ///< what this skill answers, by its chosen method
 };
 
-/// Distance (m) of the tool from the contact point over the target's place. Rows are y, columns x.
+/// Distance (m) of the tool at contact from the mean point at which the trials touch the target,
+/// over the target's place. Rows are y, columns x. The answer's contact is that of its own
+/// alignment.
 struct ContactErrorMap {
   std::vector<double> x_m, y_m;
   double z_m = 0;            ///< the trials' mean
