@@ -169,7 +169,7 @@ double TextWidth(std::string_view text, double size) {
   for (const char c : text) {
     if ((static_cast<unsigned char>(c) & 0xC0U) != 0x80U) ++characters;  // UTF-8
   }
-  return 0.53 * size * static_cast<double>(characters);
+  return 0.55 * size * static_cast<double>(characters);
 }
 
 }  // namespace exemplar::figures
