@@ -18,6 +18,19 @@ std::string StatusText(const api::RecorderStatus& status) {
             " s, " + std::to_string(status.messages) + " messages, " +
             FormatFixed(1e-6 * static_cast<double>(status.bytes), 2) + " MB\n";
   }
+  constexpr double kMega = 1e-6;
+  text += "rate      " + FormatFixed(status.rate_hz, 1) + " samples/s, " +
+          FormatFixed(kMega * status.bytes_per_s, 3) + " MB/s, " + std::to_string(status.lost) +
+          " lost\ndisk      " +
+          FormatFixed(kMega * static_cast<double>(status.disk_free_bytes), 0) + " MB free\n";
+  if (status.part > 0) text += "part      " + std::to_string(status.part) + '\n';
+  if (status.pauses > 0) {
+    text += "paused    " + std::to_string(status.pauses) + " times, " +
+            std::to_string(status.left_out) + " samples left out\n";
+  }
+  if (status.buffered_s > 0) {
+    text += "buffered  " + FormatFixed(status.buffered_s, 1) + " s before an event\n";
+  }
   if (status.topics.empty()) return text;
   Table topics({"TOPIC", "SENT", "RECEIVED", "LOST", "HZ", "WRITERS", "TYPE"});
   for (const api::TopicFigures& topic : status.topics) {
@@ -51,7 +64,7 @@ void AddRecordCommands(Command& root, const Session& session) {
   struct StartWords {
     std::string name, format;
     std::vector<std::string> metadata, topics;
-    std::optional<double> wait_s;
+    std::optional<double> wait_s, split_s, split_mb;
   };
   const auto words = std::make_shared<StartWords>();
   Command command = record.Add("start", "Begins a file",
@@ -61,6 +74,8 @@ void AddRecordCommands(Command& root, const Session& session) {
   command.Option("--meta", "NAME=VALUE", words->metadata, "kept in the file; several times");
   command.Option("--topic", "TOPIC", words->topics, "wait until it has a writer; several times");
   command.Option("--wait", "SECONDS", words->wait_s, "limit of that wait (default: 5)");
+  command.Option("--split-s", "SECONDS", words->split_s, "a new file after so long");
+  command.Option("--split-mb", "MEGABYTES", words->split_mb, "a new file after so much");
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] {
     const auto metadata = ParsePairs(words->metadata, "--meta");
@@ -70,8 +85,43 @@ void AddRecordCommands(Command& root, const Session& session) {
     start.metadata = *metadata;
     start.expected_topics = words->topics;
     if (words->wait_s) start.timeout_s = *words->wait_s;
+    if (words->split_s) start.split_s = *words->split_s;
+    if (words->split_mb) {
+      constexpr double kLargestMb = 1e9;
+      if (!(*words->split_mb >= 0 && *words->split_mb <= kLargestMb)) {
+        return FailUsage(InvalidArgument(
+            "--split-mb is " + FormatDouble(*words->split_mb) + ", must lie between 0 and 1e9",
+            "--split-mb"));
+      }
+      start.split_bytes = static_cast<std::uint64_t>(1e6 * *words->split_mb);
+    }
     return Do(session, words->format,
               [&](api::RecorderApi& recorder) { return recorder.Start(start); });
+  });
+
+  struct EventWords {
+    std::string note, name, format;
+    std::vector<std::string> metadata;
+  };
+  const auto event = std::make_shared<EventWords>();
+  command = record.Add("event",
+                       "Marks an event; without a recording, begins one that holds the seconds "
+                       "before it as well",
+                       {"exemplar record event --note \"the button stuck\"",
+                        "exemplar record event --name fault-7"});
+  command.Option("--note", "TEXT", event->note, "what happened");
+  command.Option("--name", "NAME", event->name, "of a file that begins (default: from the time)");
+  command.Option("--meta", "NAME=VALUE", event->metadata, "kept in such a file; several times");
+  AddFormat(command, event->format, {"text", "json"});
+  command.Runs([&session, event] {
+    const auto metadata = ParsePairs(event->metadata, "--meta");
+    if (!metadata) return FailUsage(metadata.error());
+    api::RecordEvent request;
+    request.note = event->note;
+    request.name = event->name;
+    request.metadata = *metadata;
+    return Do(session, event->format,
+              [&](api::RecorderApi& recorder) { return recorder.MarkEvent(request); });
   });
 
   struct Action {

@@ -210,8 +210,20 @@ json ToJson(const api::RecorderStatus& status) {
                       {"has_schema", topic.has_schema},
                       {"writers", topic.writers}});
   }
-  return {{"state", status.state},           {"detail", status.detail},     {"file", status.file},
-          {"duration_s", status.duration_s}, {"messages", status.messages}, {"bytes", status.bytes},
+  return {{"state", status.state},
+          {"detail", status.detail},
+          {"file", status.file},
+          {"duration_s", status.duration_s},
+          {"messages", status.messages},
+          {"bytes", status.bytes},
+          {"lost", status.lost},
+          {"rate_hz", status.rate_hz},
+          {"bytes_per_s", status.bytes_per_s},
+          {"disk_free_bytes", status.disk_free_bytes},
+          {"part", status.part},
+          {"pauses", status.pauses},
+          {"left_out", status.left_out},
+          {"buffered_s", status.buffered_s},
           {"topics", std::move(topics)}};
 }
 

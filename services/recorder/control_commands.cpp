@@ -16,18 +16,36 @@ Result<api::RecordStart> ParseStart(const std::map<std::string, std::string>& ar
       for (const std::string_view topic : Split(value, ',')) {
         if (!Trim(topic).empty()) start.expected_topics.emplace_back(Trim(topic));
       }
-    } else if (name == "timeout_s") {
-      const std::optional<double> seconds = ParseDouble(value);
-      if (!seconds) {
-        return InvalidArgument("timeout_s: \"" + value + "\" is not a number", "timeout_s");
+    } else if (name == "timeout_s" || name == "split_s" || name == "split_bytes") {
+      const std::optional<double> number = ParseDouble(value);
+      constexpr double kLargest = 1e15;
+      if (!number || !(*number >= 0 && *number <= kLargest)) {
+        return InvalidArgument(name + ": \"" + value + "\" is not a number from 0 to 1e15", name);
       }
-      start.timeout_s = *seconds;
+      if (name == "timeout_s") start.timeout_s = *number;
+      if (name == "split_s") start.split_s = *number;
+      if (name == "split_bytes") start.split_bytes = static_cast<std::uint64_t>(*number);
     } else {
       const bool prefixed = name.starts_with(kMetaPrefix) && name.size() > kMetaPrefix.size();
       start.metadata[prefixed ? name.substr(kMetaPrefix.size()) : name] = value;
     }
   }
   return start;
+}
+
+api::RecordEvent ParseEvent(const std::map<std::string, std::string>& arguments) {
+  api::RecordEvent event;
+  for (const auto& [name, value] : arguments) {
+    if (name == "name") {
+      event.name = value;
+    } else if (name == "note") {
+      event.note = value;
+    } else {
+      const bool prefixed = name.starts_with(kMetaPrefix) && name.size() > kMetaPrefix.size();
+      event.metadata[prefixed ? name.substr(kMetaPrefix.size()) : name] = value;
+    }
+  }
+  return event;
 }
 
 Result<api::RecorderStatus> Do(api::RecorderApi& recorder, const ircp::CommandSample& command) {
@@ -39,10 +57,12 @@ Result<api::RecorderStatus> Do(api::RecorderApi& recorder, const ircp::CommandSa
   if (command.action == "stop") return recorder.Stop();
   if (command.action == "pause") return recorder.Pause();
   if (command.action == "resume") return recorder.Resume();
+  if (command.action == "event") return recorder.MarkEvent(ParseEvent(command.arguments));
   if (command.action == "status") return recorder.GetStatus();
-  return InvalidArgument("action \"" + command.action +
-                             "\" is unknown; start, stop, pause, resume and status are known",
-                         "action");
+  return InvalidArgument(
+      "action \"" + command.action +
+          "\" is unknown; start, stop, pause, resume, event and status are known",
+      "action");
 }
 
 }  // namespace
@@ -63,7 +83,13 @@ std::map<std::string, std::string> StatusValues(const api::RecorderStatus& statu
           {"duration_s", FormatFixed(status.duration_s, 3)},
           {"sent", std::to_string(sent)},
           {"received", std::to_string(received)},
-          {"lost", std::to_string(lost)}};
+          {"lost", std::to_string(lost)},
+          {"rate_hz", FormatFixed(status.rate_hz, 1)},
+          {"bytes_per_s", FormatFixed(status.bytes_per_s, 0)},
+          {"disk_free_bytes", std::to_string(status.disk_free_bytes)},
+          {"part", std::to_string(status.part)},
+          {"pauses", std::to_string(status.pauses)},
+          {"left_out", std::to_string(status.left_out)}};
 }
 
 ircp::Answer AnswerCommand(api::RecorderApi& recorder, const ircp::CommandSample& command) {

@@ -1,13 +1,17 @@
 // exemplar-recorder: a station's topics into MCAP files, told over gRPC and DDS.
 
+#include <atomic>
+
 #include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/ircp/control.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
+#include "exemplar/rpc/call_log.hpp"
 #include "exemplar/rpc/server.hpp"
 #include "recorder/control_commands.hpp"
 #include "recorder/metrics.hpp"
+#include "recorder/program_options.hpp"
 #include "recorder/recorder.hpp"
 
 int main(int argc, char** argv) {
@@ -18,6 +22,8 @@ int main(int argc, char** argv) {
                            "exemplar-recorder --station lab --data-dir /var/lib/exemplar",
                            {.bus = true, .server = true, .data = true});
   options.Add("--all-topics", all_topics, "record every topic, not only those under ircp/");
+  recorder::ProgramOptions words;
+  words.AddTo(options);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
   const program::CommonOptions& common = options.common();
 
@@ -32,12 +38,14 @@ int main(int argc, char** argv) {
   if (!participant) return program::Fail(kName, participant.error());
 
   std::unique_ptr<ircp::ControlServer> control;
+  std::atomic<ircp::ControlServer*> told = nullptr;
   recorder::RecorderOptions settings;
   settings.data_dir = common.data_dir;
   settings.station = common.station;
+  if (const Status read = words.Apply(settings); !read) return program::Fail(kName, read.error());
   if (all_topics) settings.wanted = [](const ircp::RawTopic&) { return true; };
-  settings.on_change = [&control](const std::string& state, const std::string& detail) {
-    if (control != nullptr) control->SetState(state, detail);
+  settings.on_change = [&told](const std::string& state, const std::string& detail) {
+    if (ircp::ControlServer* const server = told) server->SetState(state, detail);
   };
   auto recorder = recorder::Recorder::Create(**participant, clock, *log,
                                              bus::Decode<ircp::StatusSample>, std::move(settings));
@@ -50,21 +58,32 @@ int main(int argc, char** argv) {
   if (!server_of_commands) return program::Fail(kName, server_of_commands.error());
   control = std::move(*server_of_commands);
   control->SetValues([&api] { return recorder::StatusValues(*api.GetStatus()); });
-  control->SetState("ready", "listening");
+  control->SetOnRival([&log](const std::string& writer) {
+    log->Warning("another recorder runs in this station: both obey the same commands",
+                 {{"writer", writer}, {"advice", "end one of them, or give it its own --station"}});
+  });
+  const api::RecorderStatus status = *api.GetStatus();
+  control->SetState(status.state, status.detail);
+  told = control.get();
 
-  auto server = rpc::Server::Create({.listen = common.listen, .port_file = common.port_file},
-                                    {.recorder = &api});
+  rpc::CallLog calls(*log);
+  auto server = rpc::Server::Create(
+      {.listen = common.listen,
+       .port_file = common.port_file,
+       .on_call = [&calls](const rpc::CallRecord& call) { calls.Record(call); }},
+      {.recorder = &api});
   if (!server) return program::Fail(kName, server.error());
-  std::unique_ptr<program::MetricsServer> metrics;
-  if (!common.metrics.empty()) {
-    auto made = program::MetricsServer::Create(common.metrics, recorder::MetricsOf(api));
-    if (!made) return program::Fail(kName, made.error());
-    metrics = std::move(*made);
+  std::vector<Metric> figures = recorder::MetricsOf(api);
+  for (Metric& metric : rpc::MetricsOf(calls, "exemplar_recorder")) {
+    figures.push_back(std::move(metric));
   }
+  const auto metrics = program::ServeMetrics(common, std::move(figures));
+  if (!metrics) return program::Fail(kName, metrics.error());
   log->Info("ready", {{"address", (*server)->address()}, {"data_dir", common.data_dir}});
   signals.Wait();
   (*server)->Shutdown(std::chrono::seconds(1));
   (*recorder)->Close();
+  told = nullptr;
   control.reset();
   return 0;
 }

@@ -1,19 +1,16 @@
 #include "recorder/recorder.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <condition_variable>
-#include <cstring>
 #include <deque>
 #include <mutex>
-#include <span>
 #include <thread>
 
-#include "exemplar/recording/file.hpp"
+#include "recorder/byte_window.hpp"
+#include "recorder/folder.hpp"
 #include "recorder/loss_ledger.hpp"
-#include "recorder/recording_file.hpp"
+#include "recorder/part_files.hpp"
+#include "recorder/pre_buffer.hpp"
 #include "recorder/state.hpp"
 
 namespace exemplar::recorder {
@@ -21,21 +18,6 @@ namespace {
 
 constexpr Duration kPoll = std::chrono::milliseconds(10);
 constexpr Duration kLossInterval = std::chrono::seconds(1);
-constexpr std::size_t kLongestName = 200;
-
-struct Arrival {
-  ircp::RawSample sample;
-  std::string source;
-};
-
-/// 20261122T032433.123Z
-std::string NameFromTime(Stamp stamp) {
-  std::string name;
-  for (const char c : ToIso8601(stamp)) {
-    if (c != '-' && c != ':') name += c;
-  }
-  return name;
-}
 
 class RecorderImpl final : public Recorder {
  public:
@@ -43,7 +25,9 @@ class RecorderImpl final : public Recorder {
       : clock_(clock),
         log_(log),
         decode_status_(std::move(decode_status)),
-        options_(std::move(options)) {}
+        options_(std::move(options)),
+        pre_buffer_(options_.pre_buffer,
+                    std::min(options_.pre_buffer_bytes, options_.queue_bytes / 2)) {}
 
   ~RecorderImpl() override {
     Close();
@@ -60,39 +44,74 @@ class RecorderImpl final : public Recorder {
     tap_ = std::move(*made);
     {
       const std::lock_guard lock(mutex_);
-      const Result<State> next = Next(state_, Event::kOpen);
-      if (!next.ok()) return next.error();
-      state_ = *next;
-      detail_ = "listening";
+      opening_ = true;
+      detail_ = "waits for writers of " + Join(options_.expected_topics, ", ");
     }
+    OpenIfMatched();
     writer_thread_ = std::jthread([this](std::stop_token stop) { WriteLoop(std::move(stop)); });
     return {};
   }
 
   Result<api::RecorderStatus> Start(const api::RecordStart& request) override {
     const std::lock_guard control(control_mutex_);
-    {
-      const std::lock_guard lock(mutex_);
-      if (const Result<State> next = Next(state_, Event::kStart); !next.ok()) return next.error();
+    if (const Status can = CheckNext(Event::kStart); !can.ok()) return can.error();
+    if (const Status there = AwaitWriters(request); !there.ok()) return there.error();
+    OpenIfMatched();
+    if (const Status begun = Begin(request, false); !begun.ok()) return begun.error();
+    return Changed();
+  }
+
+  Result<api::RecorderStatus> MarkEvent(const api::RecordEvent& event) override {
+    const std::lock_guard control(control_mutex_);
+    if (const Status can = CheckNext(Event::kMark); !can.ok()) return can.error();
+    const Stamp at = clock_.Now();
+    Duration before{0};
+    if (!HasFile()) {
+      api::RecordStart start;
+      start.name = event.name;
+      start.metadata = event.metadata;
+      {
+        const std::lock_guard lock(mutex_);
+        before = pre_buffer_.length(clock_.Steady());
+      }
+      if (const Status begun = Begin(start, true); !begun.ok()) return begun.error();
     }
+    const Status marked =
+        WriteMark("exemplar.event", {{"at", ToIso8601(at)},
+                                     {"note", event.note},
+                                     {"kept_before_s", FormatFixed(ToSeconds(before), 3)}});
+    if (!marked.ok()) return marked.error();
+    return Changed();
+  }
+
+ private:
+  /// Precondition: control_mutex_ is held. `with_past`: what the pre-buffer holds comes first.
+  Status Begin(const api::RecordStart& request, bool with_past) {
+    if (const Status can = CheckNext(Event::kStart); !can.ok()) return can.error();
     const Stamp now = clock_.Now();
     const std::string name = request.name.empty() ? NameFromTime(now) : request.name;
     if (const Status valid = CheckRecordingName(name); !valid.ok()) return valid.error();
-    if (const Status there = AwaitWriters(request); !there.ok()) return there.error();
-
-    const std::filesystem::path path = options_.data_dir / (name + ".mcap");
-    Result<std::unique_ptr<recording::FileSink>> sink = recording::FileSink::Create(path);
-    if (!sink.ok()) return sink.error();
-    Result<std::unique_ptr<recording::FileScratch>> scratch =
-        recording::FileScratch::Create(options_.data_dir);
-    if (!scratch.ok()) return scratch.error();
-    Result<std::unique_ptr<RecordingFile>> file =
-        RecordingFile::Create(**sink, options_.file,
-                              {name, options_.station, now, request.metadata}, std::move(*scratch));
+    if (!(request.split_s >= 0)) {
+      return InvalidArgument(
+          "split_s is " + FormatDouble(request.split_s) + ", must not be negative", "split_s");
+    }
+    const SplitLimits limits{
+        .bytes = request.split_bytes > 0 ? request.split_bytes : options_.split_bytes,
+        .length = request.split_s > 0 ? FromSeconds(request.split_s) : options_.split_length};
+    RecordingInfo info;
+    info.name = name;
+    info.station = options_.station;
+    info.started = now;
+    info.metadata = request.metadata;
+    Result<std::unique_ptr<PartFiles>> file = PartFiles::Create(
+        options_.data_dir, std::move(info), limits, options_.file, clock_, [this] {
+          const std::lock_guard lock(mutex_);
+          return Difference(ledger_.writers(), at_start_);
+        });
     if (!file.ok()) return file.error();
+    const std::string path = (*file)->path().string();
     {
       const std::lock_guard lock_file(file_mutex_);
-      sink_ = std::move(*sink);
       file_ = std::move(*file);
       last_flush_ = clock_.Steady();
       last_losses_ = last_flush_;
@@ -100,20 +119,35 @@ class RecorderImpl final : public Recorder {
     }
     {
       const std::lock_guard lock(mutex_);
+      const Duration steady = clock_.Steady();
+      const auto figures = [this] { return ledger_.writers(); };
+      if (with_past) {
+        PreBuffer::Content past = pre_buffer_.Take(steady, figures);
+        at_start_ = std::move(past.figures);
+        queue_ = std::move(past.arrivals);
+        queue_bytes_ = past.bytes;
+      } else {
+        pre_buffer_.Clear();
+        at_start_ = figures();
+      }
       state_ = State::kRecording;
       detail_ = "recording " + name;
-      path_ = path.string();
+      path_ = path;
       failure_.reset();
-      at_start_ = ledger_.writers();
       recorded_before_ = Duration(0);
-      recording_since_ = clock_.Steady();
+      recording_since_ = steady;
       messages_ = 0;
       bytes_ = 0;
+      part_ = limits.any() ? 1 : 0;
+      pauses_ = 0;
+      left_out_ = 0;
+      arrived_.notify_one();
     }
-    log_.Info("recording", {{"file", path.string()}});
-    return Changed();
+    log_.Info("recording", {{"file", path}});
+    return {};
   }
 
+ public:
   Result<api::RecorderStatus> Stop() override {
     const std::lock_guard control(control_mutex_);
     return StopHeld();
@@ -143,13 +177,11 @@ class RecorderImpl final : public Recorder {
     {
       const std::lock_guard lock_file(file_mutex_);
       if (file_ != nullptr) {
-        finished = file_->Finish(clock_.Now(), losses);
+        finished = file_->Finish(losses, PauseFigures());
         const std::lock_guard lock(mutex_);
-        messages_ = file_->messages();
-        bytes_ = file_->bytes();
+        NoteFileLocked();
       }
       file_.reset();
-      sink_.reset();
     }
     {
       const std::lock_guard lock(mutex_);
@@ -166,8 +198,12 @@ class RecorderImpl final : public Recorder {
     return status;
   }
 
-  Result<api::RecorderStatus> Pause() override { return Switch(Event::kPause, "paused"); }
-  Result<api::RecorderStatus> Resume() override { return Switch(Event::kResume, "recording"); }
+  Result<api::RecorderStatus> Pause() override {
+    return Switch(Event::kPause, "paused", "exemplar.pause");
+  }
+  Result<api::RecorderStatus> Resume() override {
+    return Switch(Event::kResume, "recording", "exemplar.resume");
+  }
 
   void Close() override {
     const std::lock_guard control(control_mutex_);
@@ -178,7 +214,8 @@ class RecorderImpl final : public Recorder {
     }
     {
       const std::lock_guard lock(mutex_);
-      if (state_ == State::kClosed) return;
+      if (state_ == State::kClosed && !opening_) return;
+      opening_ = false;
       SetStateLocked(State::kClosed, "closed");
     }
     Changed();
@@ -195,7 +232,8 @@ class RecorderImpl final : public Recorder {
 
   // ---- on threads of the network
 
-  void OnTopic(const ircp::RawTopic& topic) {
+  void OnTopic(ircp::RawTopic topic) {
+    if (topic.schema.empty()) topic.schema = options_.schema_of(topic.type);
     {
       const std::lock_guard lock(mutex_);
       ledger_.AddTopic(topic);
@@ -223,9 +261,21 @@ class RecorderImpl final : public Recorder {
       if (status.ok()) announced = std::move(status->sent);
     }
     const std::lock_guard lock(mutex_);
-    ledger_.AddReceived(sample, header, clock_.Steady());
+    const Duration now = clock_.Steady();
+    const bool has_file = HasFileLocked();
+    if (!has_file) pre_buffer_.Prepare(now, [this] { return ledger_.writers(); });
+    ledger_.AddReceived(sample, header, now);
     for (const ircp::TopicCount& count : announced) ledger_.AddAnnounced(sample.writer, count);
-    if (state_ != State::kRecording || !sample.valid) return;
+    window_.Add(sample.cdr.size(), now);
+    if (!sample.valid) return;
+    if (!has_file) {
+      pre_buffer_.Add({std::move(sample), header ? std::move(header->source) : std::string()}, now);
+      return;
+    }
+    if (state_ == State::kPaused) {
+      ++left_out_;
+      return;
+    }
     if (queue_bytes_ + sample.cdr.size() > options_.queue_bytes) {
       ledger_.AddDropped(sample.topic, sample.writer);
       return;
@@ -247,6 +297,7 @@ class RecorderImpl final : public Recorder {
         batch.swap(queue_);
         writing_ = true;
       }
+      OpenIfMatched();
       const std::size_t written_bytes = WriteBatch(batch);
       {
         const std::lock_guard lock(mutex_);
@@ -282,10 +333,17 @@ class RecorderImpl final : public Recorder {
     if (const Status kept = KeepPromises(); !kept.ok()) Fail(kept.error());
     if (file_ != nullptr) {
       const std::lock_guard lock(mutex_);
-      messages_ = file_->messages();
-      bytes_ = file_->bytes();
+      NoteFileLocked();
     }
     return bytes;
+  }
+
+  /// Precondition: both the file's lock and the inner one are held, and there is a file.
+  void NoteFileLocked() {
+    messages_ = file_->messages();
+    bytes_ = file_->bytes();
+    part_ = file_->part();
+    path_ = file_->path().string();
   }
 
   ircp::RawTopic TopicOf(const ircp::RawSample& sample) {
@@ -324,7 +382,6 @@ class RecorderImpl final : public Recorder {
   void Fail(const Error& error) {
     log_.Error("recording failed", {{"error", error.message}});
     file_.reset();
-    sink_.reset();
     {
       const std::lock_guard lock(mutex_);
       failure_ = error;
@@ -342,10 +399,12 @@ class RecorderImpl final : public Recorder {
           "timeout_s is " + std::to_string(request.timeout_s) + ", must lie between 0 and 3600",
           "timeout_s");
     }
+    std::vector<std::string> expected = options_.expected_topics;
+    expected.insert(expected.end(), request.expected_topics.begin(), request.expected_topics.end());
     const Duration deadline = clock_.Steady() + FromSeconds(request.timeout_s);
     while (true) {
       std::vector<std::string> missing;
-      for (const std::string& topic : request.expected_topics) {
+      for (const std::string& topic : expected) {
         if (tap_->matched_writers(topic) == 0) missing.push_back(topic);
       }
       if (missing.empty()) return {};
@@ -369,15 +428,72 @@ class RecorderImpl final : public Recorder {
     } while (clock_.Steady() < deadline);
   }
 
-  Result<api::RecorderStatus> Switch(Event event, const std::string& detail) {
+  Result<api::RecorderStatus> Switch(Event event, const std::string& detail,
+                                     const std::string& mark) {
     const std::lock_guard control(control_mutex_);
+    bool changed = false;
     {
-      const std::lock_guard lock(mutex_);
+      std::unique_lock lock(mutex_);
       const Result<State> next = Next(state_, event);
       if (!next.ok()) return next.error();
-      if (*next != state_) SetStateLocked(*next, detail);
+      changed = *next != state_;
+      if (changed) SetStateLocked(*next, detail);
+      if (changed && event == Event::kPause) {
+        ++pauses_;
+        drained_.wait(lock, [&] { return queue_.empty() && !writing_; });
+      }
+    }
+    if (changed) {
+      recording::StringMap fields = PauseFigures();
+      fields["at"] = ToIso8601(clock_.Now());
+      if (const Status s = WriteMark(mark, std::move(fields)); !s.ok()) return s.error();
     }
     return Changed();
+  }
+
+  recording::StringMap PauseFigures() {
+    const std::lock_guard lock(mutex_);
+    return {{"pauses", std::to_string(pauses_)}, {"left_out", std::to_string(left_out_)}};
+  }
+
+  /// A record about what happened; a failing disk ends the recording.
+  Status WriteMark(const std::string& name, recording::StringMap fields) {
+    const std::lock_guard lock_file(file_mutex_);
+    if (file_ == nullptr) {
+      const std::lock_guard lock(mutex_);
+      return failure_ ? Status(*failure_) : FailedPrecondition("no file is open");
+    }
+    Status written = file_->WriteMark(name, std::move(fields));
+    if (written.ok()) written = file_->Flush();
+    if (!written.ok()) Fail(written.error());
+    return written;
+  }
+
+  /// A recorder that waits for its writers can be told to start: the start waits, too.
+  Status CheckNext(Event event) {
+    const std::lock_guard lock(mutex_);
+    const State state = opening_ && event == Event::kStart ? State::kReady : state_;
+    const Result<State> next = Next(state, event);
+    return next.ok() ? Status() : Status(next.error());
+  }
+
+  /// On to ready, once the expected writers are there. No lock may be held but control_mutex_.
+  void OpenIfMatched() {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!opening_) return;
+    }
+    for (const std::string& topic : options_.expected_topics) {
+      if (tap_->matched_writers(topic) == 0) return;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      if (!opening_) return;
+      opening_ = false;
+      state_ = State::kReady;
+      detail_ = "listening";
+    }
+    Changed();
   }
 
   /// Precondition: mutex_ is held.
@@ -408,6 +524,15 @@ class RecorderImpl final : public Recorder {
     status.messages = messages_;
     status.bytes = bytes_;
     status.topics = ledger_.TopicFigures(now);
+    for (const api::TopicFigures& topic : status.topics) {
+      status.lost += topic.lost;
+      status.rate_hz += topic.rate_hz;
+    }
+    status.bytes_per_s = window_.PerSecond(now);
+    status.part = part_;
+    status.pauses = pauses_;
+    status.left_out = left_out_;
+    if (!HasFileLocked()) status.buffered_s = ToSeconds(pre_buffer_.length(now));
     return status;
   }
 
@@ -421,6 +546,9 @@ class RecorderImpl final : public Recorder {
     for (api::TopicFigures& topic : status.topics) {
       topic.writers = tap_->matched_writers(topic.topic);
     }
+    std::error_code unknown;
+    const std::filesystem::space_info space = std::filesystem::space(options_.data_dir, unknown);
+    if (!unknown) status.disk_free_bytes = space.available;
     return status;
   }
 
@@ -442,18 +570,23 @@ class RecorderImpl final : public Recorder {
   std::mutex file_mutex_;     ///< the file and its bookkeeping
   std::mutex mutex_;          ///< everything below it
 
-  std::unique_ptr<recording::FileSink> sink_;
-  std::unique_ptr<RecordingFile> file_;
+  std::unique_ptr<PartFiles> file_;
   Duration last_flush_{0};
   Duration last_losses_{0};
   std::uint64_t losses_written_ = 0;
 
   State state_ = State::kClosed;
+  bool opening_ = false;  ///< on the network, but not ready: waits for its writers
   std::string detail_;
   std::optional<Error> failure_;  ///< of the last recording
   std::string path_;
   std::uint64_t messages_ = 0;
   std::uint64_t bytes_ = 0;
+  int part_ = 0;
+  int pauses_ = 0;
+  std::uint64_t left_out_ = 0;
+  PreBuffer pre_buffer_;
+  ByteWindow window_;
   Duration recorded_before_{0};  ///< of this recording, before the last pause
   Duration recording_since_{0};
   LossLedger ledger_;
@@ -467,36 +600,7 @@ class RecorderImpl final : public Recorder {
   std::jthread writer_thread_;
 };
 
-Status MakeFolder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    return InvalidArgument(folder.string() + ": cannot be made: " + error.message(), "data_dir");
-  }
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    return FailedPrecondition(folder.string() + ": cannot be written: " + std::strerror(errno),
-                              "data_dir");
-  }
-  return {};
-}
-
 }  // namespace
-
-Status CheckRecordingName(const std::string& name) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  };
-  if (name.empty() || name.front() == '.' || name.size() > kLongestName ||
-      !std::all_of(name.begin(), name.end(), allowed)) {
-    return InvalidArgument(
-        "name \"" + name.substr(0, kLongestName) +
-            "\" cannot name a file: letters, digits, '.', '_' and '-', at most " +
-            std::to_string(kLongestName) + ", not beginning with a dot",
-        "name");
-  }
-  return {};
-}
 
 Result<std::unique_ptr<Recorder>> Recorder::Create(ircp::RawBus& bus, const Clock& clock, Log& log,
                                                    StatusDecoder decode_status,

@@ -22,6 +22,19 @@ struct RecorderOptions {
   };
   /// Samples between network and disk may take this much; what comes beyond is dropped and counted.
   std::size_t queue_bytes = std::size_t{64} << 20;
+  /// What came before an event and is kept for it: at least this long, as far as these bytes allow
+  /// (half of queue_bytes at the most).
+  Duration pre_buffer = std::chrono::seconds(10);
+  std::size_t pre_buffer_bytes = std::size_t{32} << 20;
+  /// A new file after this much, where a start says nothing else; 0: never.
+  std::uint64_t split_bytes = 0;
+  Duration split_length{0};
+  /// Ready once each of these has a writer; every start waits for them as for its own.
+  std::vector<std::string> expected_topics = {};
+  /// Flattened IDL by type name, for writers that bring none.
+  std::function<std::string(const std::string& type)> schema_of = [](const std::string&) {
+    return std::string();
+  };
   /// What was received reaches the disk, synced, after this long at the most.
   Duration flush_interval = std::chrono::milliseconds(100);
   /// Stop() waits this long at the most for what writers have announced but is still on its way.

@@ -20,6 +20,14 @@ recording::Metadata AboutWriter(const WriterFigures& figures) {
   return {"exemplar.losses", std::move(fields)};
 }
 
+recording::StringMap AboutRecording(const RecordingInfo& info) {
+  recording::StringMap fields = {
+      {"name", info.name}, {"station", info.station}, {"started", ToIso8601(info.started)}};
+  if (info.part > 0) fields["part"] = std::to_string(info.part);
+  if (!info.previous_file.empty()) fields["previous_file"] = info.previous_file;
+  return fields;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<RecordingFile>> RecordingFile::Create(
@@ -28,9 +36,7 @@ Result<std::unique_ptr<RecordingFile>> RecordingFile::Create(
   Result<std::unique_ptr<recording::Writer>> writer =
       recording::Writer::Create(sink, std::move(options), std::move(scratch));
   if (!writer.ok()) return writer.error();
-  const recording::Metadata about{
-      "exemplar.recording",
-      {{"name", info.name}, {"station", info.station}, {"started", ToIso8601(info.started)}}};
+  const recording::Metadata about{"exemplar.recording", AboutRecording(info)};
   if (const Status s = (*writer)->Write(about); !s.ok()) return s.error();
   if (!info.metadata.empty()) {
     const recording::Metadata trial{"exemplar.trial", info.metadata};
@@ -104,18 +110,23 @@ Status RecordingFile::WriteLosses(const std::vector<WriterFigures>& losses) {
   return {};
 }
 
-Status RecordingFile::Finish(Stamp stopped, const std::vector<WriterFigures>& losses) {
+Status RecordingFile::WriteMark(const std::string& name, recording::StringMap fields) {
+  unsynced_ = true;
+  return writer_->Write(recording::Metadata{name, std::move(fields)});
+}
+
+Status RecordingFile::Finish(Stamp stopped, const std::vector<WriterFigures>& losses,
+                             const recording::StringMap& more) {
   if (const Status s = WriteLosses(losses); !s.ok()) return s;
   std::uint64_t lost = 0;
   for (const WriterFigures& figures : losses) lost += figures.lost();
-  const recording::Metadata about{"exemplar.recording",
-                                  {{"name", info_.name},
-                                   {"station", info_.station},
-                                   {"started", ToIso8601(info_.started)},
-                                   {"stopped", ToIso8601(stopped)},
-                                   {"messages", std::to_string(messages())},
-                                   {"lost", std::to_string(lost)}}};
-  if (const Status s = writer_->Write(about); !s.ok()) return s;
+  recording::StringMap fields = AboutRecording(info_);
+  fields["stopped"] = ToIso8601(stopped);
+  fields["messages"] = std::to_string(messages());
+  fields["lost"] = std::to_string(lost);
+  fields.insert(more.begin(), more.end());
+  if (const Status s = writer_->Write(recording::Metadata{"exemplar.recording", fields}); !s.ok())
+    return s;
   return writer_->Close();
 }
 

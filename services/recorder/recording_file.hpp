@@ -16,16 +16,18 @@ struct RecordingInfo {
   std::string station;
   Stamp started;
   std::map<std::string, std::string> metadata;  ///< the caller's: operator, skill, notes, ...
+  int part = 0;                                 ///< of a recording that is split, from 1; else 0
+  std::string previous_file;                    ///< of the part before, without folder
 };
 
 /// One recording as MCAP: a channel for each writer of a topic (its metadata names writer and
 /// source), schemas as flattened IDL ("omgidl"), messages as "cdr"; log time is reception, publish
 /// time the source's stamp, sequence the low 32 bits of the protocol's number. Metadata records:
-///   exemplar.recording   name, station, times
+///   exemplar.recording   name, station, times; of a part its number and its neighbours' files
 ///   exemplar.trial       the caller's
-///   exemplar.losses      one a writer and topic: received, lost by cause; again whenever they
-///   grew,
-///                        so the last one of a writer counts
+///   exemplar.losses      one a writer and topic: received, lost by cause, since the recording (not
+///                        the part) began; again whenever they grew, so the last of a writer counts
+///   exemplar.pause, exemplar.resume, exemplar.event   when, and what came with it
 /// Thread-compatible.
 class RecordingFile {
  public:
@@ -38,9 +40,12 @@ class RecordingFile {
   Status Write(const ircp::RawTopic& topic, const std::string& source,
                const ircp::RawSample& sample);
   Status WriteLosses(const std::vector<WriterFigures>& losses);
+  Status WriteMark(const std::string& name, recording::StringMap fields);
   /// Everything so far survives a kill when it returns.
   Status Flush();
-  Status Finish(Stamp stopped, const std::vector<WriterFigures>& losses);
+  /// `more` goes into "exemplar.recording".
+  Status Finish(Stamp stopped, const std::vector<WriterFigures>& losses,
+                const recording::StringMap& more = {});
 
   std::uint64_t messages() const { return writer_->statistics().message_count; }
   std::uint64_t bytes() const { return writer_->bytes_written(); }

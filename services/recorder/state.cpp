@@ -26,6 +26,8 @@ std::string_view ToString(Event event) {
       return "open";
     case Event::kStart:
       return "start";
+    case Event::kMark:
+      return "mark an event";
     case Event::kStop:
       return "stop";
     case Event::kPause:
@@ -49,6 +51,10 @@ Result<State> Next(State state, Event event) {
       break;
     case Event::kStart:
       if (state == State::kReady || state == State::kStopped) return State::kRecording;
+      break;
+    case Event::kMark:
+      if (has_file) return state;
+      if (listening) return State::kRecording;
       break;
     case Event::kStop:
       if (has_file || state == State::kStopped) return State::kStopped;

@@ -13,13 +13,14 @@ enum class State {
   kStopped,    ///< listening; the last file is closed
 };
 
-enum class Event { kOpen, kStart, kStop, kPause, kResume, kFail, kClose };
+enum class Event { kOpen, kStart, kMark, kStop, kPause, kResume, kFail, kClose };
 
 std::string_view ToString(State state);
 std::string_view ToString(Event event);
 
-/// What follows. kFailedPrecondition names state and event where nothing does. A pause that is
-/// paused already, and a stop that is stopped already, are no error: commands come twice.
+/// What follows. A mark begins a recording where there is none. kFailedPrecondition names state and
+/// event where nothing does. A pause that is paused already, and a stop that is stopped already,
+/// are no error: commands come twice.
 Result<State> Next(State state, Event event);
 
 }  // namespace exemplar::recorder

@@ -252,8 +252,181 @@ TEST_F(RecorderTest, TellsEveryChangeOfState) {
   ASSERT_TRUE(recorder_->Resume().ok());
   MustStop();
   recorder_->Close();
-  EXPECT_THAT(states_, ElementsAre("recording", "paused", "recording", "stopped", "closed"));
+  EXPECT_THAT(states_,
+              ElementsAre("ready", "recording", "paused", "recording", "stopped", "closed"));
   EXPECT_EQ(recorder_->Start({}).error().code, ErrorCode::kFailedPrecondition);
+}
+
+TEST_F(RecorderTest, SplitsBySizeWithEverySampleInExactlyOneFile) {
+  settings_.file.compression = recording::Compression::kNone;
+  settings_.file.chunk_bytes = 1000;
+  Open();
+  api::RecordStart start;
+  start.name = "long";
+  start.split_bytes = 10'000;
+  ASSERT_TRUE(recorder_->Start(start).ok());
+  constexpr int kSamples = 2000;
+  for (int i = 0; i < kSamples; ++i) bus_.Publish(kSuit, "suit");
+  const api::RecorderStatus stopped = MustStop();
+  EXPECT_EQ(stopped.messages, static_cast<std::uint64_t>(kSamples));
+  ASSERT_GT(stopped.part, 3);
+  std::int64_t last = 0;
+  for (int part = 1; part <= stopped.part; ++part) {
+    const std::string number = std::to_string(part);
+    const std::string name = "long_" + std::string(4 - number.size(), '0') + number;
+    const FileContent file = ReadFile(PathOf(name));
+    EXPECT_TRUE(file.closed);
+    ASSERT_FALSE(file.messages.empty()) << name;
+    for (const recording::Message& message : file.messages) {
+      EXPECT_EQ(message.publish_time.nanoseconds(), last + 1000);
+      last = message.publish_time.nanoseconds();
+    }
+    const recording::StringMap& about = *file.Find("exemplar.recording");
+    EXPECT_EQ(about.at("part"), number);
+    EXPECT_EQ(about.count("previous_file"), part == 1 ? 0u : 1u);
+    EXPECT_EQ(about.count("next_file"), part == stopped.part ? 0u : 1u);
+  }
+  EXPECT_EQ(last, 1000 * kSamples);
+  // Its name is taken, split or not.
+  EXPECT_EQ(recorder_->Start(start).error().code, ErrorCode::kAlreadyExists);
+}
+
+TEST_F(RecorderTest, SplitsByTime) {
+  Open();
+  api::RecordStart start;
+  start.name = "timed";
+  start.split_s = 10;
+  ASSERT_TRUE(recorder_->Start(start).ok());
+  bus_.Publish(kSuit, "suit");
+  ASSERT_TRUE(testing::Eventually([&] { return recorder_->GetStatus()->messages == 1; }));
+  clock_.Advance(std::chrono::seconds(11));
+  bus_.Publish(kSuit, "suit");
+  EXPECT_EQ(MustStop().part, 2);
+  EXPECT_EQ(ReadFile(PathOf("timed_0001")).messages.size(), 1u);
+  EXPECT_EQ(ReadFile(PathOf("timed_0002")).messages.size(), 1u);
+}
+
+TEST_F(RecorderTest, AnEventKeepsTheSecondsBeforeItAndCountsTheirLosses) {
+  settings_.pre_buffer = std::chrono::seconds(10);
+  Open();
+  bus_.Publish(kSuit, "suit");  // too old
+  clock_.Advance(std::chrono::seconds(30));
+  for (int i = 0; i < 5; ++i) {
+    bus_.Publish(kSuit, "suit", i == 3 ? 2 : 0);
+    clock_.Advance(std::chrono::seconds(1));
+  }
+  EXPECT_NEAR(recorder_->GetStatus()->buffered_s, 5, 1e-9);
+  const auto marked = recorder_->MarkEvent({.note = "stuck", .name = "e", .metadata = {}});
+  ASSERT_TRUE(marked.ok()) << marked.error().message;
+  EXPECT_EQ(marked->state, "recording");
+  bus_.Publish(kSuit, "suit");
+  ASSERT_TRUE(recorder_->MarkEvent({.note = "again", .name = "", .metadata = {}}).ok());
+  EXPECT_EQ(MustStop().messages, 6u);
+  const FileContent file = ReadFile(PathOf("e"));
+  ASSERT_EQ(file.messages.size(), 6u);
+  EXPECT_EQ(file.messages.front().publish_time, Stamp::FromNanoseconds(2000));
+  EXPECT_EQ(file.Find("exemplar.event")->at("note"), "again");
+  EXPECT_EQ(file.Find("exemplar.losses")->at("received"), "6");
+  EXPECT_EQ(file.Find("exemplar.losses")->at("lost_in_gaps"), "2");
+  EXPECT_EQ(std::count_if(file.metadata.begin(), file.metadata.end(),
+                          [](const auto& m) { return m.name == "exemplar.event"; }),
+            2);
+}
+
+TEST_F(RecorderTest, KeepsNoMoreForAnEventThanItMay) {
+  settings_.pre_buffer_bytes = 20'000;
+  Open();
+  for (int i = 0; i < 1000; ++i) bus_.Publish(kSuit, "suit", 0, 200);
+  ASSERT_TRUE(recorder_->MarkEvent({.note = "", .name = "e", .metadata = {}}).ok());
+  MustStop();
+  const FileContent file = ReadFile(PathOf("e"));
+  std::size_t bytes = 0;
+  for (const recording::Message& message : file.messages) bytes += message.data.size();
+  EXPECT_LE(bytes, 20'000u);
+  EXPECT_GT(bytes, 15'000u);
+  EXPECT_EQ(file.messages.back().publish_time, Stamp::FromNanoseconds(1'000'000));
+}
+
+TEST_F(RecorderTest, CountsAndMarksPausesInTheFile) {
+  Open();
+  MustStart("p");
+  bus_.Publish(kSuit, "suit");
+  for (int pause = 0; pause < 2; ++pause) {
+    ASSERT_TRUE(recorder_->Pause().ok());
+    for (int i = 0; i < 3; ++i) bus_.Publish(kSuit, "suit");
+    ASSERT_TRUE(recorder_->Resume().ok());
+  }
+  const api::RecorderStatus stopped = MustStop();
+  EXPECT_EQ(stopped.pauses, 2);
+  EXPECT_EQ(stopped.left_out, 6u);
+  const FileContent file = ReadFile(PathOf("p"));
+  EXPECT_EQ(file.messages.size(), 1u);
+  EXPECT_EQ(file.Find("exemplar.pause")->at("pauses"), "2");
+  EXPECT_EQ(file.Find("exemplar.resume")->at("left_out"), "6");
+  EXPECT_EQ(file.Find("exemplar.recording")->at("left_out"), "6");
+}
+
+TEST_F(RecorderTest, IsReadyOnceTheExpectedWritersAreThere) {
+  settings_.expected_topics = {kSuit};
+  settings_.schema_of = [](const std::string& type) {
+    return type == "lab::Reading" ? "module lab { struct Reading { long x; }; };" : "";
+  };
+  auto made = Recorder::Create(
+      bus_, clock_, log_,
+      [](std::span<const std::uint8_t>) {
+        return Result<ircp::StatusSample>(ircp::StatusSample());
+      },
+      settings_);
+  ASSERT_TRUE(made.ok());
+  recorder_ = std::move(*made);
+  EXPECT_EQ(recorder_->GetStatus()->state, "closed");
+  api::RecordStart start;
+  start.timeout_s = 0.1;
+  EXPECT_EQ(recorder_->Start(start).error().code, ErrorCode::kDeadlineExceeded);
+  bus_.AddWriter(kSuit, "exemplar::ircp::v1::Suit", HeaderIdl("Suit"));
+  bus_.AddWriter("ircp/strange", "lab::Reading", "");
+  ASSERT_TRUE(testing::Eventually([&] { return recorder_->GetStatus()->state == "ready"; }));
+  MustStart("s");
+  bus_.Publish("ircp/strange", "x");
+  MustStop();
+  const FileContent file = ReadFile(PathOf("s"));
+  ASSERT_EQ(file.schemas.size(), 1u);  // from the folder
+  EXPECT_EQ(file.schemas[0].name, "lab::Reading");
+}
+
+/// Of this process, in bytes.
+std::uint64_t ResidentBytes() {
+  std::ifstream stream("/proc/self/statm");
+  std::uint64_t total = 0;
+  std::uint64_t resident = 0;
+  stream >> total >> resident;
+  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(RecorderTest, TakesNoMoreMemoryWhileTheFileGrows) {
+  settings_.file.compression = recording::Compression::kNone;
+  settings_.file.chunk_bytes = 4096;  // as many index entries as hours of recording have
+  settings_.queue_bytes = std::size_t{1} << 20;
+  settings_.pre_buffer = Duration(0);
+  Open();
+  MustStart("long");
+  const auto grow_to = [&](std::uint64_t bytes) {
+    while (true) {
+      const api::RecorderStatus status = *recorder_->GetStatus();
+      if (status.bytes >= bytes) return;
+      for (int i = 0; i < 100; ++i) bus_.Publish(kSuit, "suit", 0, 8192);
+      const std::uint64_t sent = bus_.last_seq(kSuit);
+      ASSERT_TRUE(testing::Eventually([&] { return recorder_->GetStatus()->messages == sent; }));
+    }
+  };
+  grow_to(20'000'000);
+  const std::uint64_t before = ResidentBytes();
+  grow_to(240'000'000);
+  const std::uint64_t after = ResidentBytes();
+  const api::RecorderStatus stopped = MustStop();
+  EXPECT_EQ(stopped.lost, 0u);
+  EXPECT_GT(stopped.bytes, 220'000'000u);
+  EXPECT_LT(after, before + 4'000'000) << "grew while 220 MB were written";
 }
 
 TEST_F(RecorderTest, WritesNothingWhilePaused) {

@@ -199,6 +199,17 @@ struct RecordStart {
   std::map<std::string, std::string> metadata;
   std::vector<std::string> expected_topics;  ///< wait until these have a writer; may be empty
   double timeout_s = 5;
+  /// A new file (NAME_0001.mcap, ...) after this much; 0: as the recorder was told.
+  std::uint64_t split_bytes = 0;
+  double split_s = 0;
+};
+
+/// Something happened that is worth keeping: in a recording it is marked; without one, a recording
+/// begins that holds the seconds before it as well.
+struct RecordEvent {
+  std::string note;
+  std::string name;                             ///< of a recording that begins; as RecordStart's
+  std::map<std::string, std::string> metadata;  ///< likewise
 };
 
 struct TopicFigures {
@@ -220,6 +231,14 @@ struct RecorderStatus {
   std::uint64_t messages = 0;
   std::uint64_t bytes = 0;
   std::vector<TopicFigures> topics;  ///< since the recorder started
+  std::uint64_t lost = 0;            ///< of all topics, since the recorder started
+  double rate_hz = 0;                ///< samples a second of all topics
+  double bytes_per_s = 0;            ///< their bytes
+  std::uint64_t disk_free_bytes = 0;
+  int part = 0;                ///< of a recording that is split, from 1; else 0
+  int pauses = 0;              ///< of this recording
+  std::uint64_t left_out = 0;  ///< samples that came while it was paused
+  double buffered_s = 0;       ///< what an event would keep from before it
 };
 
 /// Implementations are thread-safe.
@@ -230,6 +249,7 @@ class RecorderApi {
   virtual Result<RecorderStatus> Stop() = 0;
   virtual Result<RecorderStatus> Pause() = 0;
   virtual Result<RecorderStatus> Resume() = 0;
+  virtual Result<RecorderStatus> MarkEvent(const RecordEvent& event) = 0;
   virtual Result<RecorderStatus> GetStatus() = 0;
 };
 

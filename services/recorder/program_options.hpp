@@ -1,0 +1,26 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "exemplar/program/options.hpp"
+#include "recorder/recorder.hpp"
+
+namespace exemplar::recorder {
+
+/// The recorder's own flags.
+class ProgramOptions {
+ public:
+  void AddTo(program::Options& options);
+  /// Fails when the schema folder cannot be read.
+  Status Apply(RecorderOptions& settings) const;
+
+ private:
+  double split_mb_ = 0;
+  double split_s_ = 0;
+  double pre_buffer_s_ = 10;
+  double pre_buffer_mb_ = 32;
+  std::vector<std::string> expected_;
+  std::string schema_dir_;
+};
+
+}  // namespace exemplar::recorder
