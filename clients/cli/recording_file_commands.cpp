@@ -5,6 +5,7 @@
 
 #include "commands.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/recording/append.hpp"
 #include "exemplar/recording/file.hpp"
 #include "exemplar/recording/reader.hpp"
 #include "exemplar/recording/recover.hpp"
@@ -14,8 +15,11 @@
 namespace exemplar::cli {
 namespace {
 
+constexpr const char* kLabels = "exemplar.labels";
+
 struct Words {
   std::string file, output, format;
+  std::vector<std::string> labels;
 };
 
 struct TopicInfo {
@@ -33,6 +37,7 @@ struct FileInfo {
 };
 
 Result<FileInfo> ReadInfo(const std::string& path) {
+  if (const Status whole = recording::FinishAppend(path); !whole) return whole.error();
   const auto file = recording::FileSource::Open(path);
   if (!file) return file.error();
   const auto opened = recording::IndexedReader::Open(**file);
@@ -118,7 +123,32 @@ int Info(const Words& words) {
   return 0;
 }
 
+/// Adds to the labels that the file has; an empty value takes one away.
+int Label(const Words& words) {
+  const auto changes = ParsePairs(words.labels, "LABEL");
+  if (!changes) return FailUsage(changes.error());
+  Result<FileInfo> info = ReadInfo(words.file);
+  if (!info) return Fail(info.error());
+  recording::StringMap labels = info->metadata[kLabels];
+  for (const auto& [name, value] : *changes) {
+    if (value.empty()) {
+      labels.erase(name);
+    } else {
+      labels[name] = value;
+    }
+  }
+  const Status added = recording::AppendMetadata(words.file, {kLabels, labels});
+  if (!added) return Fail(added.error());
+  if (words.format == "json") {
+    Print({{"file", words.file}, {"labels", labels}});
+    return 0;
+  }
+  for (const auto& [name, value] : labels) std::cout << name << " = " << value << '\n';
+  return 0;
+}
+
 int Recover(const Words& words) {
+  if (const Status whole = recording::FinishAppend(words.file); !whole) return Fail(whole.error());
   const std::filesystem::path input = words.file;
   std::filesystem::path output = words.output;
   if (output.empty()) {
@@ -164,6 +194,17 @@ void AddRecordingFileCommands(Command& record) {
   command.Argument("FILE", words->file, "MCAP");
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([words] { return Info(*words); });
+
+  words = std::make_shared<Words>();
+  command = record.Add("label",
+                       "Writes labels into a recording (success, phase, notes, ...): its messages "
+                       "stay as they are; NAME= takes a label away. Needs no server",
+                       {"exemplar record label trial-001.mcap success=yes phase=press",
+                        "exemplar record label trial-001.mcap notes="});
+  command.Argument("FILE", words->file, "MCAP");
+  command.Arguments("NAME=VALUE", words->labels, "one or several");
+  AddFormat(command, words->format, {"text", "json"});
+  command.Runs([words] { return Label(*words); });
 
   words = std::make_shared<Words>();
   command = record.Add("recover",

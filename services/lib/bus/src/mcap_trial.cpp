@@ -46,6 +46,9 @@ class TrialReader {
     for (const auto& [topic, count] : repeated_) {
       notices.push_back(topic + ": " + std::to_string(count) + " samples stood twice");
     }
+    for (const auto& [name, value] : labels_) {
+      notices.push_back("label " + name + ": " + value);
+    }
     for (const std::string& topic : strangers_) {
       notices.push_back(topic + ": not a topic of ours, left alone");
     }
@@ -113,6 +116,7 @@ class TrialReader {
 
   /// The recorder's figures; of several about one writer, the sum cannot grow by a repetition.
   void TakeMetadata(const recording::Metadata& metadata) {
+    if (metadata.name == "exemplar.labels") labels_ = metadata.metadata;  // the last one counts
     if (metadata.name != "exemplar.losses") return;
     const auto value = [&](const char* name) {
       const auto found = metadata.metadata.find(name);
@@ -138,6 +142,7 @@ class TrialReader {
   std::map<std::string, std::uint64_t> repeated_;
   std::map<std::string, std::uint64_t> lost_at_end_;
   std::map<std::pair<std::string, std::string>, std::uint64_t> lost_at_end_of_;
+  recording::StringMap labels_;
   std::set<std::string> strangers_;
 };
 
