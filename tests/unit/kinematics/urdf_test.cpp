@@ -91,6 +91,8 @@ TEST(ParseUrdf, FindsMeshesOfPackages) {
   EXPECT_EQ(path_of("package://my_robot/meshes/arm.stl"), (root / "meshes/arm.stl").string());
   EXPECT_EQ(path_of("../meshes/arm.stl"), (root / "meshes/arm.stl").string());
   EXPECT_EQ(path_of("file:///x/arm.stl"), "/x/arm.stl");
+  // The package's folder was given another name.
+  EXPECT_EQ(path_of("package://its_old_name/meshes/arm.stl"), (root / "meshes/arm.stl").string());
   EXPECT_THAT(path_of("package://elsewhere/arm.stl"), EndsWith("elsewhere/arm.stl"));
 }
 

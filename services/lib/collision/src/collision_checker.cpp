@@ -20,6 +20,7 @@ struct Snapshot {
   double s = 0;
   std::vector<Placement> placements;
   std::vector<Bounds> bounds;
+  std::vector<BoundingCapsule> capsules;
   std::vector<double> distances;  ///< one a pair, kUnknown until asked
 };
 
@@ -42,10 +43,12 @@ struct CollisionChecker::Impl {
     kinematics::LinkPoses(model, q, base_T_links);
     snapshot.placements.resize(robot_parts.size());
     snapshot.bounds.resize(robot_parts.size());
+    snapshot.capsules.resize(robot_parts.size());
     for (std::size_t i = 0; i < robot_parts.size(); ++i) {
       const RobotPart& part = robot_parts[i];
       snapshot.placements[i] = Placement::From(base_T_links[part.link] * part.link_T_shape);
       snapshot.bounds[i] = part.shape.BoundsAt(snapshot.placements[i]);
+      snapshot.capsules[i] = part.capsule.At(Placement::From(base_T_links[part.link]));
     }
   }
 
@@ -56,6 +59,15 @@ struct CollisionChecker::Impl {
   double LowerBound(const Pair& pair, const Snapshot& at) const {
     const Bounds& other = pair.scene ? scene_parts[pair.second].bounds : at.bounds[pair.second];
     return Distance(at.bounds[pair.first], other) - Padding(pair);
+  }
+
+  /// The better of the bounds by boxes and by capsules.
+  double TightBound(const Pair& pair, const Snapshot& at) const {
+    const BoundingCapsule& other =
+        pair.scene ? scene_parts[pair.second].capsule : at.capsules[pair.second];
+    Eigen::Vector3d on_first, on_second;
+    const double apart = Distance(at.capsules[pair.first], other, on_first, on_second);
+    return std::max(LowerBound(pair, at), apart - Padding(pair));
   }
 
   Separation Measure(const Pair& pair, const Snapshot& at) const {
@@ -148,6 +160,27 @@ struct CollisionChecker::Impl {
     });
   }
 
+  /// Adds how fast a point of a link moves along `direction` with each joint. base_T_links are set.
+  void AddMotion(int link, const Eigen::Vector3d& base_p, const Eigen::Vector3d& direction,
+                 Eigen::VectorXd& gradient) const {
+    for (int index = model.links[link].parent_joint; index >= 0;
+         index = model.links[model.joints[index].parent_link].parent_joint) {
+      const kinematics::Joint& joint = model.joints[index];
+      if (joint.type == kinematics::JointType::kFixed) continue;
+      // A joint turns its child link about an axis that stays the same in that link.
+      const geometry::Pose& at = base_T_links[joint.child_link];
+      const Eigen::Vector3d axis = at.rotation * joint.axis;
+      const double speed = joint.type == kinematics::JointType::kPrismatic
+                               ? axis.dot(direction)
+                               : axis.cross(base_p - at.translation).dot(direction);
+      if (joint.mimic) {
+        gradient[joint.mimic->joint] += joint.mimic->multiplier * speed;
+      } else {
+        gradient[index] += speed;
+      }
+    }
+  }
+
   struct Search {
     const JointPath& path;
     double required_m;
@@ -178,6 +211,7 @@ struct CollisionChecker::Impl {
       double needed = 2 * search.required_m;
       for (const Lever& lever : pair.levers) needed += lever.length * search.travel[lever.joint];
       if (LowerBound(pair, low) + LowerBound(pair, high) >= needed) continue;
+      if (TightBound(pair, low) + TightBound(pair, high) >= needed) continue;
       const double at_low = Measured(index, low);
       if (at_low < search.required_m) return Violation{low.s, Describe(index, low)};
       const double at_high = Measured(index, high);
@@ -257,7 +291,7 @@ Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::Vect
   impl.queue.clear();
   for (std::size_t i = 0; i < impl.pairs.size(); ++i) {
     if (!allowed.empty() && impl.IsAllowed(impl.pairs[i], allowed)) continue;
-    impl.queue.emplace_back(impl.LowerBound(impl.pairs[i], impl.scratch), static_cast<int>(i));
+    impl.queue.emplace_back(impl.TightBound(impl.pairs[i], impl.scratch), static_cast<int>(i));
   }
   std::make_heap(impl.queue.begin(), impl.queue.end(), std::greater<>());
   double smallest = kInfinity;
@@ -276,6 +310,44 @@ Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::Vect
   }
   if (smallest_pair < 0) return {{}, {}, kInfinity};
   return impl.Describe(smallest_pair, impl.scratch);
+}
+
+double CollisionChecker::CapsuleSelfClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                              Eigen::VectorXd* gradient) const {
+  const Impl& impl = *impl_;
+  kinematics::LinkPoses(impl.model, q, impl.base_T_links);
+  std::vector<BoundingCapsule>& capsules = impl.scratch.capsules;
+  capsules.resize(impl.robot_parts.size());
+  for (std::size_t i = 0; i < capsules.size(); ++i) {
+    const RobotPart& part = impl.robot_parts[i];
+    const geometry::Pose& base_T_link = impl.base_T_links[part.link];
+    capsules[i] = {base_T_link * part.capsule.centre, base_T_link.rotation * part.capsule.axis,
+                   part.capsule.half, part.capsule.radius};
+  }
+  double smallest = kInfinity;
+  const Pair* nearest = nullptr;
+  Eigen::Vector3d on_first, on_second, p_first, p_second;
+  for (const Pair& pair : impl.self_pairs) {
+    const BoundingCapsule& first = capsules[pair.first];
+    const BoundingCapsule& second = capsules[pair.second];
+    // Balls around the capsules decide most pairs.
+    const double reach =
+        smallest + first.radius + first.half + second.radius + second.half + impl.Padding(pair);
+    if ((first.centre - second.centre).squaredNorm() > reach * reach && reach > 0) continue;
+    const double apart = Distance(first, second, on_first, on_second) - impl.Padding(pair);
+    if (apart >= smallest) continue;
+    smallest = apart;
+    nearest = &pair;
+    p_first = on_first;
+    p_second = on_second;
+  }
+  if (gradient == nullptr) return smallest;
+  gradient->setZero(q.size());
+  if (nearest == nullptr || (p_first - p_second).norm() < 1e-12) return smallest;
+  const Eigen::Vector3d apart = (p_first - p_second).normalized();
+  impl.AddMotion(impl.robot_parts[nearest->first].link, p_first, apart, *gradient);
+  impl.AddMotion(impl.robot_parts[nearest->second].link, p_second, -apart, *gradient);
+  return smallest;
 }
 
 std::optional<Violation> CollisionChecker::FirstViolation(

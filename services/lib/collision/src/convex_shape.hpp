@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,11 @@ class ConvexShape {
   double radius() const { return radius_; }
   /// kSegment: z; kBox: all; kCylinder: x is the radius, z half the length; kHull: of its bounds.
   const Eigen::Vector3d& half() const { return half_; }
+  /// kHull: its corners; empty else.
+  std::span<const Eigen::Vector3d> vertices() const {
+    return vertices_ ? std::span<const Eigen::Vector3d>(*vertices_)
+                     : std::span<const Eigen::Vector3d>();
+  }
   struct Fcl;  ///< the geometries as FCL wants them
   const Fcl& fcl() const { return *fcl_; }
 

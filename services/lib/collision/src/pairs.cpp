@@ -92,7 +92,8 @@ Result<std::vector<RobotPart>> MakeRobotParts(const RobotModel& model) {
         return WithPlace(shape.error(),
                          "link \"" + model.links[link].name + "\": collision geometry");
       }
-      parts.push_back({static_cast<int>(link), geometry.link_T_shape, *std::move(shape)});
+      const BoundingCapsule capsule = FitCapsule(*shape).At(Placement::From(geometry.link_T_shape));
+      parts.push_back({static_cast<int>(link), geometry.link_T_shape, *std::move(shape), capsule});
     }
   }
   return parts;
@@ -106,7 +107,8 @@ Result<std::vector<ScenePart>> MakeSceneParts(const Scene& scene) {
       return WithPlace(shape.error(), "object \"" + scene.objects[i].name + "\"");
     }
     const Placement at = Placement::From(scene.objects[i].base_T_shape);
-    parts.push_back({static_cast<int>(i), at, shape->BoundsAt(at), *shape});
+    parts.push_back(
+        {static_cast<int>(i), at, shape->BoundsAt(at), *shape, FitCapsule(*shape).At(at)});
   }
   return parts;
 }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "bounding_capsule.hpp"
 #include "convex_shape.hpp"
 #include "exemplar/collision/scene.hpp"
 
@@ -16,6 +17,7 @@ struct RobotPart {
   int link = -1;
   geometry::Pose link_T_shape;
   ConvexShape shape;
+  BoundingCapsule capsule;  ///< around the shape, in the link's frame
 };
 
 /// One convex shape of the scene, where it stays.
@@ -24,6 +26,7 @@ struct ScenePart {
   Placement base_at;
   Bounds bounds;
   ConvexShape shape;
+  BoundingCapsule capsule;  ///< around the shape, in the base frame
 };
 
 /// How much a joint's travel (by index of the model; mimic joints count for their leader) can move

@@ -37,7 +37,8 @@ std::vector<std::string_view> SplitWords(std::string_view text) {
 }
 
 /// Where package://NAME/... and relative paths point: the folder of the URDF or one above it, that
-/// holds (or is) the package. The file need not exist: kinematics does without meshes.
+/// holds (or is) the package, also under another name. The file need not exist: kinematics does
+/// without meshes.
 std::string ResolveMeshPath(std::string path, const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
   if (path.starts_with("file://")) return path.substr(7);
@@ -52,6 +53,9 @@ std::string ResolveMeshPath(std::string path, const std::filesystem::path& folde
     if (fs::exists(at / inside, ignored)) return (at / inside).string();
     if (at.filename() == package && fs::exists(at / rest, ignored)) return (at / rest).string();
     if (at == at.parent_path()) break;
+  }
+  for (fs::path at = start.lexically_normal(); at != at.parent_path(); at = at.parent_path()) {
+    if (fs::exists(at / rest, ignored)) return (at / rest).string();
   }
   return (folder / inside).lexically_normal().string();
 }

@@ -93,6 +93,13 @@ class CollisionChecker {
   Clearance SmallestClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
                               const std::vector<AllowedTouch>& allowed = {}) const;
 
+  /// The smallest distance of the robot to itself by capsules around its geometry: never more than
+  /// the true one, and much quicker. `gradient` (by joint index of the model, as q), where wanted:
+  /// how it changes with each joint; zero where the nearest capsules' axes meet. Does not allocate
+  /// after the first call.
+  double CapsuleSelfClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
+                              Eigen::VectorXd* gradient = nullptr) const;
+
   /// Proves that the clearance is at least `required_clearance_m` all along [begin, end], by the
   /// clearance at a few places and how far any point of a link can move from there (conservative
   /// bisection), or returns the first place where it is not. Nothing between the places can be
