@@ -1,0 +1,101 @@
+"""A real recorder: killed at random moments, told of events, split, its files labelled."""
+
+import calendar
+import pathlib
+import random
+import shutil
+import tempfile
+import time
+import unittest
+
+import processes
+import trials
+from processes import exemplar, wait_for
+
+TOPIC = "ircp/end_effector"
+# The flush interval, and what a busy machine may take before it lets the writing thread run.
+OLDEST_LOST_S = 0.1 + 0.4
+
+
+class RecorderTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-recorder-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.programs = processes.Programs(self.folder, 93)
+        self.addCleanup(self.programs.end)
+        self.trial = trials.write_set(self.folder / "trials", [(0.55, -0.20, 0.06)])[0]
+        with open(self.trial, encoding="utf-8") as stream:
+            self.samples = sum(1 for _ in stream) - 1
+
+    def replay(self, *words):
+        return self.programs.start("exemplar-capture-suit", "--replay", self.trial, *words)
+
+    def messages(self, server):
+        return exemplar("record", "status", "--server", server)["messages"]
+
+    def test_a_killed_recorder_loses_no_more_than_the_flush_interval(self):
+        rng = random.Random(4)
+        for number in range(3):
+            recorder, server = self.programs.recorder()
+            capture = self.replay("--rate", "1")
+            name = f"killed-{number}"
+            exemplar("record", "start", "--name", name, "--topic", TOPIC, "--server", server)
+            wait_for(lambda: self.messages(server) > 20, "samples")
+            time.sleep(rng.uniform(0, 0.7))
+            killed = time.time()
+            recorder.kill()
+            recorder.wait()
+            capture.kill()
+            capture.wait()
+            file = self.folder / "data" / f"{name}.mcap"
+            report = exemplar("record", "recover", file, "--output", self.folder / f"{name}.whole.mcap")
+            self.assertFalse(report["was_whole"])
+            self.assertEqual(report["damaged_chunks"], 0)
+            info = exemplar("record", "info", self.folder / f"{name}.whole.mcap")
+            end = exemplar_time(info["start"]) + info["duration_s"]
+            self.assertGreater(end, killed - OLDEST_LOST_S, self.programs.logs())
+
+    def test_an_event_keeps_what_came_before_it_and_labels_come_later(self):
+        _, server = self.programs.recorder("--pre-buffer-s", "60")
+        self.replay("--rate", "4").wait(30)
+        received = {topic["topic"]: topic["received"] for topic in exemplar("record", "status", "--server", server)["topics"]}
+        self.assertEqual(received[TOPIC], self.samples, self.programs.logs())
+        marked = exemplar("record", "event", "--note", "stuck", "--name", "event", "--server", server)
+        self.assertEqual(marked["state"], "recording")
+        stopped = exemplar("record", "stop", "--server", server)
+        self.assertGreater(stopped["disk_free_bytes"], 0)
+        file = self.folder / "data" / "event.mcap"
+        before = file.read_bytes()
+        exemplar("record", "label", file, "success=no", "phase=press")
+        labels = exemplar("record", "label", file, "success=yes", "phase=")["labels"]
+        self.assertEqual(labels, {"success": "yes"})
+        info = exemplar("record", "info", file)
+        self.assertEqual({topic["topic"]: topic["messages"] for topic in info["topics"]}[TOPIC], self.samples)
+        self.assertEqual(info["metadata"]["exemplar.labels"], {"success": "yes"})
+        self.assertEqual(info["metadata"]["exemplar.event"]["note"], "stuck")
+        self.assertEqual(file.read_bytes()[: len(before) // 2], before[: len(before) // 2])
+
+    def test_a_split_recording_has_every_sample_once(self):
+        _, server = self.programs.recorder()
+        capture = self.replay("--rate", "2")
+        exemplar("record", "start", "--name", "split", "--topic", TOPIC, "--split-s", "0.5", "--server", server)
+        capture.wait(30)
+        stopped = exemplar("record", "stop", "--server", server)
+        files = sorted((self.folder / "data").glob("split_*.mcap"))
+        self.assertEqual(len(files), stopped["part"])
+        self.assertGreater(len(files), 2)
+        infos = [exemplar("record", "info", file) for file in files]
+        self.assertEqual(sum(info["messages"] for info in infos), stopped["messages"])
+        for before, info in zip(files, infos[1:]):
+            self.assertEqual(info["metadata"]["exemplar.recording"]["previous_file"], before.name)
+
+
+def exemplar_time(text):
+    """Seconds since the epoch of an ISO 8601 time with nanoseconds."""
+    whole, _, fraction = text.rstrip("Z").partition(".")
+    seconds = time.strptime(whole + " UTC", "%Y-%m-%dT%H:%M:%S %Z")
+    return calendar.timegm(seconds) + float("0." + (fraction or "0"))
+
+
+if __name__ == "__main__":
+    unittest.main()

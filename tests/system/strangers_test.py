@@ -1,0 +1,62 @@
+"""Topics of a stranger, written with Cyclone DDS: recorded whole, keyed and not, with each source of schema."""
+
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import processes
+from processes import exemplar
+
+HERE = pathlib.Path(__file__).resolve().parent / "strangers"
+COUNT = 3000
+
+
+class StrangersTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-strangers-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        if not shutil.which("idlc") or not pathlib.Path("/usr/include/dds/dds.h").exists():
+            self.skipTest("cyclonedds-dev and cyclonedds-tools are not installed")
+        subprocess.run(["idlc", "-l", "c", HERE / "reading.idl"], cwd=self.folder, check=True)
+        self.writer = self.folder / "writer"
+        subprocess.run(["gcc", "-I", self.folder, HERE / "writer.c", self.folder / "reading.c", "-lddsc", "-o", self.writer], check=True)
+        self.programs = processes.Programs(self.folder, 95)
+        self.addCleanup(self.programs.end)
+
+    def record(self, kind, schema=(), recorder_words=()):
+        """The topic as `record info` and the recorder's status show it."""
+        _, server = self.programs.recorder("--all-topics", *recorder_words)
+        topic = f"lab/{kind}"
+        command = [self.writer, "95", "test", topic, kind, COUNT, *schema]
+        writer = subprocess.Popen([str(word) for word in command])
+        exemplar("record", "start", "--name", kind, "--topic", topic, "--wait", "20", "--server", server)
+        self.assertEqual(writer.wait(60), 0, self.programs.logs())
+        status = exemplar("record", "stop", "--server", server)
+        figures = next(entry for entry in status["topics"] if entry["topic"] == topic)
+        self.assertEqual(figures["lost"], 0)
+        info = exemplar("record", "info", self.folder / "data" / f"{kind}.mcap")
+        found = next(entry for entry in info["topics"] if entry["topic"] == topic)
+        self.assertEqual(found["messages"], COUNT, self.programs.logs())
+        self.assertEqual(found["encoding"], "cdr")
+        return found, figures
+
+    def test_a_topic_without_schema_is_recorded_as_it_is_and_said_so(self):
+        found, figures = self.record("plain")
+        self.assertEqual(found["type"], "")
+        self.assertFalse(figures["has_schema"])
+        self.assertIn("topic without schema", self.programs.logs())
+
+    def test_a_keyed_topic_has_its_schema_from_the_user_data(self):
+        found, figures = self.record("keyed", schema=[HERE / "reading.idl"])
+        self.assertEqual(found["type"], "lab::v1::KeyedReading")
+        self.assertTrue(figures["has_schema"])
+
+    def test_a_keyed_topic_has_its_schema_from_the_folder(self):
+        found, _ = self.record("keyed", recorder_words=["--schema-dir", HERE])
+        self.assertEqual(found["type"], "lab::v1::KeyedReading")
+
+
+if __name__ == "__main__":
+    unittest.main()
