@@ -24,6 +24,14 @@ TEST(RecorderState, FollowsATrialFromStartToStop) {
   }
 }
 
+TEST(RecorderState, AMarkBeginsARecordingOnlyWhereThereIsNone) {
+  EXPECT_EQ(*Next(State::kReady, Event::kMark), State::kRecording);
+  EXPECT_EQ(*Next(State::kStopped, Event::kMark), State::kRecording);
+  EXPECT_EQ(*Next(State::kRecording, Event::kMark), State::kRecording);
+  EXPECT_EQ(*Next(State::kPaused, Event::kMark), State::kPaused);
+  EXPECT_FALSE(Next(State::kClosed, Event::kMark).ok());
+}
+
 TEST(RecorderState, RefusesWhatDoesNotFollowByName) {
   EXPECT_EQ(Next(State::kReady, Event::kStop).error().message,
             "the recorder is ready, it cannot stop");
