@@ -55,6 +55,25 @@ class RecorderTest(unittest.TestCase):
             end = exemplar_time(info["start"]) + info["duration_s"]
             self.assertGreater(end, killed - OLDEST_LOST_S, self.programs.logs())
 
+    def test_a_full_disk_stops_the_recording_with_what_is_written_intact(self):
+        data = self.folder / "data"
+        data.mkdir()
+        small_disk = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs -o size=48k tmpfs "$0" && exec "$@"', data)
+        recorder, server = self.programs.recorder(prefix=small_disk)
+        capture = self.replay("--rate", "4")
+        exemplar("record", "start", "--name", "full", "--topic", TOPIC, "--server", server)
+        status = lambda: exemplar("record", "status", "--server", server)
+        wait_for(lambda: status()["state"] == "stopped", "the disk to be full")
+        capture.wait(30)
+        self.assertIn("stopped by a failure", status()["detail"])
+        self.assertIn("No space left on device", status()["detail"])
+        file = pathlib.Path(f"/proc/{recorder.pid}/root{data}/full.mcap")
+        report = exemplar("record", "recover", file, "--output", self.folder / "whole.mcap")
+        self.assertGreater(report["messages"], 0)
+        self.assertEqual(report["damaged_chunks"], 0)
+        self.assertEqual(report["bytes_left_out"], 0)
+        self.assertIsNone(recorder.poll())
+
     def test_an_event_keeps_what_came_before_it_and_labels_come_later(self):
         _, server = self.programs.recorder("--pre-buffer-s", "60")
         self.replay("--rate", "4").wait(30)
