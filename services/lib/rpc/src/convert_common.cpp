@@ -1,5 +1,6 @@
 #include "convert_common.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -33,6 +34,13 @@ std::string Indexed(std::string_view field, int index) {
   return std::string(field) + "[" + std::to_string(index) + "]";
 }
 
+/// Makes `message` hold `size` values, to be written by the caller: Resize would write zeros first.
+double* Room(std::size_t size, PackedDoubles* message) {
+  message->Clear();
+  message->Reserve(static_cast<int>(size));
+  return message->AddNAlreadyReserved(static_cast<int>(size));
+}
+
 constexpr double kSmallestQuaternionNorm = 1e-6;
 
 }  // namespace
@@ -53,32 +61,28 @@ std::string Utf8(std::string_view text, std::size_t bytes) {
 }
 
 void ToProto(const std::vector<double>& values, PackedDoubles* message) {
-  message->Resize(static_cast<int>(values.size()), 0);
-  if (!values.empty()) {
-    std::memcpy(message->mutable_data(), values.data(), values.size() * sizeof(double));
-  }
+  if (values.empty()) return message->Clear();
+  std::memcpy(Room(values.size(), message), values.data(), values.size() * sizeof(double));
 }
 
 void ToProto(const Eigen::Ref<const Eigen::VectorXd>& values, PackedDoubles* message) {
-  message->Resize(static_cast<int>(values.size()), 0);
-  if (values.size() > 0) {
-    std::memcpy(message->mutable_data(), values.data(), values.size() * sizeof(double));
-  }
+  if (values.size() == 0) return message->Clear();
+  std::memcpy(Room(static_cast<std::size_t>(values.size()), message), values.data(),
+              static_cast<std::size_t>(values.size()) * sizeof(double));
 }
 
 void MatrixToProto(const Eigen::MatrixXd& matrix, PackedDoubles* message) {
-  message->Resize(static_cast<int>(matrix.size()), 0);
-  Eigen::Map<RowMajor>(message->mutable_data(), matrix.rows(), matrix.cols()) = matrix;
+  if (matrix.size() == 0) return message->Clear();
+  double* const room = Room(static_cast<std::size_t>(matrix.size()), message);
+  Eigen::Map<RowMajor>(room, matrix.rows(), matrix.cols()) = matrix;
 }
 
 void PosesToProto(const std::vector<geometry::Pose>& poses, PackedDoubles* message) {
-  message->Resize(static_cast<int>(7 * poses.size()), 0);
-  Eigen::Map<Eigen::Matrix<double, 7, Eigen::Dynamic>> columns(
-      message->mutable_data(), 7, static_cast<Eigen::Index>(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Eigen::Index column = static_cast<Eigen::Index>(i);
-    columns.col(column).head<3>() = poses[i].translation;
-    columns.col(column).tail<4>() = poses[i].rotation.coeffs();
+  if (poses.empty()) return message->Clear();
+  double* to = Room(7 * poses.size(), message);
+  for (const geometry::Pose& pose : poses) {
+    to = std::copy_n(pose.translation.data(), 3, to);
+    to = std::copy_n(pose.rotation.coeffs().data(), 4, to);
   }
 }
 
