@@ -20,6 +20,8 @@ constexpr const char* kProgram = "simulator";
 /// Behind by more than this, the world lets time pass rather than rush after it.
 constexpr Duration kLargestLag = std::chrono::milliseconds(200);
 constexpr std::size_t kStatesWaiting = 256;
+/// Beyond this a place is a slip of the hand, and bad for the physics.
+constexpr double kFarthest_m = 100;
 constexpr std::size_t kSamplesWaiting = 64;
 
 /// A sample for the robot's joints, as it came.
@@ -78,6 +80,11 @@ Result<geometry::Pose> ReadPose(const std::map<std::string, std::string>& argume
     const std::optional<double> number = ParseDouble(it->second);
     if (!number || !std::isfinite(*number)) {
       return InvalidArgument(key + ": \"" + it->second + "\" is not a finite number", key);
+    }
+    if (std::abs(*number) > kFarthest_m) {
+      return InvalidArgument(key + " is " + it->second + ", must be within " +
+                                 FormatDouble(kFarthest_m) + " m of the robot's base",
+                             key);
     }
     value = *number;
     return {};

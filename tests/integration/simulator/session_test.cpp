@@ -216,6 +216,8 @@ TEST_F(SessionRig, SaysWhyAPlaceIsRefused) {
   EXPECT_THAT(why({{"x", "0.5"}}), HasSubstr("object is missing"));
   EXPECT_THAT(why({{"object", "lamp"}}), HasSubstr("\"lamp\""));
   EXPECT_THAT(why({{"object", "target"}, {"x", "far"}}), HasSubstr("x: \"far\""));
+  EXPECT_THAT(why({{"object", "target"}, {"x", "nan"}}), HasSubstr("x: \"nan\""));
+  EXPECT_THAT(why({{"object", "target"}, {"z", "1e300"}}), HasSubstr("z is 1e300"));
   EXPECT_THAT(why({{"object", "target"}, {"qx", "0.5"}}), HasSubstr("norm"));
   const Eigen::Vector3d hand = robot_.chain.ToolPose(robot_.home).translation;
   EXPECT_THAT(why({{"object", "target"},
