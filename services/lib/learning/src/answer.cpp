@@ -207,10 +207,8 @@ Result<demonstration::SkillMotion> Answer(const Skill& skill,
         {.object = exemplars.object_names[static_cast<std::size_t>(span.object)],
          .first = span.first,
          .last = span.last,
-         .base_p_contact = prediction.contact_points.size() > k
-                               ? prediction.contact_points[k]
-                               : (point.turns ? base_T_object * point.object_p_contact
-                                              : base_T_object.translation + point.object_p_contact),
+         .base_p_contact = prediction.contact_points.size() > k ? prediction.contact_points[k]
+                                                                : point.At(base_T_object),
          .touch_measured = span.touch_measured});
   }
   return motion;

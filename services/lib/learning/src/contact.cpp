@@ -5,18 +5,26 @@
 
 #include "exemplar/learning/objectivity.hpp"
 #include "exemplar/learning/touch.hpp"
+#include "meetings.hpp"
 
 namespace exemplar::learning {
 namespace {
 
-// A stretch is in contact while its spread is below this multiple of the least spread ...
-constexpr double kNoiseFactor = 1.5;
-// ... or within this part of the paths' extent of it ...
-constexpr double kNoisePart = 0.002;
-// ... and it is contact at all only if the paths converge to less than this part of their widest.
+// Meetings count as contact only if the places are closer together than this part of the paths'
+// widest spread, or of their extent.
 constexpr double kConvergence = 0.35;
-// Objectivity that shows that the object, not the room, draws the paths together.
-constexpr double kLeastObjectivity = 0.75;
+constexpr double kNoisePart = 0.05;
+// An object that moved by more than this part of the extent between trials shows whether the
+// object, not the room, draws the paths together: by this objectivity.
+constexpr double kMovedPart = 0.05;
+constexpr double kLeastObjectivity = 0.5;
+
+// The offset of the touching point is looked for in at least this many trials, and taken when it
+// predicts left-out places clearly better.
+constexpr std::size_t kLeastForOffset = 4;
+constexpr double kClearlyCloser = 0.9;
+constexpr double kOffsetRidge = 1e-3;
+constexpr std::size_t kMostRefits = 15;
 
 std::vector<Eigen::MatrixXd> TurnedPaths(const Exemplars& exemplars, int object) {
   std::vector<Eigen::MatrixXd> paths;
@@ -88,78 +96,246 @@ std::vector<ContactSpan> ContactsFromTouch(const Exemplars& exemplars) {
       const auto best = static_cast<std::size_t>(contact.object);
       if (variances[other][contact.first] < variances[best][contact.first]) contact.object = o;
     }
+    contact.meets = contact.first;
+    contact.at_one_time = true;
     contacts.push_back(contact);
   }
   return contacts;
 }
 
-std::optional<ContactSpan> ContactFromSpread(const Exemplars& exemplars, int object) {
-  std::vector<Eigen::MatrixXd> base;
-  for (int j = 0; j < exemplars.size(); ++j) base.push_back(exemplars.BasePath(j));
-  const Eigen::VectorXd absolute = PathVariance(base);
-  const Eigen::VectorXd relative = ObjectVariance(exemplars, object);
-  Eigen::Index nearest = 0;
-  const double least = std::sqrt(relative.minCoeff(&nearest));
-  const double widest = std::sqrt(relative.maxCoeff());
-  if (!(least < kConvergence * widest)) return std::nullopt;
-  double extent = 0;
-  for (const Eigen::MatrixXd& path : base) {
-    extent = std::max(extent, (path.colwise().maxCoeff() - path.colwise().minCoeff()).norm());
+std::vector<MeetingTrial> MeetingTrials(const Alignment& alignment, const Exemplars& exemplars,
+                                        int object) {
+  const std::string& name = exemplars.object_names[static_cast<std::size_t>(object)];
+  const bool turns = exemplars.object_has_orientation[static_cast<std::size_t>(object)];
+  std::vector<MeetingTrial> trials;
+  for (const AlignedTrial& aligned : alignment.trials) {
+    const UniformTrial& own = aligned.own;
+    const auto at = std::find(own.object_names.begin(), own.object_names.end(), name);
+    const std::vector<geometry::Pose>& base_T_object =
+        own.base_T_object[static_cast<std::size_t>(at - own.object_names.begin())];
+    const std::size_t n = own.base_T_tool.size();
+    MeetingTrial trial;
+    trial.shifted.resize(static_cast<Eigen::Index>(n), 3);
+    if (turns) trial.turned.resize(static_cast<Eigen::Index>(n), 3);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector3d from_object =
+          own.base_T_tool[i].translation - base_T_object[i].translation;
+      const auto row = static_cast<Eigen::Index>(i);
+      trial.shifted.row(row) = from_object.transpose();
+      if (turns) {
+        trial.turned.row(row) = (base_T_object[i].rotation.conjugate() * from_object).transpose();
+      }
+    }
+    trials.push_back(std::move(trial));
   }
-  const bool object_moved = ObjectSpread(exemplars, object) > 1e-3 * extent;
-  const double upsilon = absolute[nearest] / (absolute[nearest] + relative[nearest] + 1e-300);
-  if (object_moved && upsilon < kLeastObjectivity) return std::nullopt;
-  const double bound = std::max(kNoiseFactor * least, least + kNoisePart * extent);
-  ContactSpan contact{.object = object,
-                      .first = static_cast<int>(nearest),
-                      .last = static_cast<int>(nearest),
-                      .touch_measured = false};
-  while (contact.first > 0 && std::sqrt(relative[contact.first - 1]) <= bound) --contact.first;
-  while (contact.last + 1 < exemplars.frames && std::sqrt(relative[contact.last + 1]) <= bound) {
-    ++contact.last;
+  return trials;
+}
+
+// The frame of the common time base at a moment of the trial's own.
+double CommonFrame(const ExemplarTrial& trial, double part) {
+  const Eigen::VectorXd& own = trial.own_time;
+  const auto* after = std::upper_bound(own.data(), own.data() + own.size(), part);
+  if (after == own.data()) return 0;
+  if (after == own.data() + own.size()) return static_cast<double>(own.size() - 1);
+  const auto k = after - own.data();
+  return static_cast<double>(k - 1) + (part - own[k - 1]) / (own[k] - own[k - 1]);
+}
+
+struct FoundContact {
+  ContactSpan span;
+  std::vector<ContactWindow> windows;  // one a trial
+  double spread_m = 0;
+};
+
+// The object, rather than the room, draws the paths to this place, and closely.
+bool Converges(const Exemplars& exemplars, const std::vector<MeetingTrial>& trials,
+               const Meeting& meeting, int object, double widest_m, double extent_m) {
+  if (exemplars.size() < 2) return true;
+  if (meeting.spread_m > std::max(kConvergence * widest_m, kNoisePart * extent_m)) return false;
+  if (ObjectSpread(exemplars, object) <= kMovedPart * extent_m) return true;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> places;
+  for (std::size_t j = 0; j < trials.size(); ++j) {
+    const geometry::Pose& base_T_object = exemplars.trials[j].ObjectAt(object, 0);
+    places.push_back(trials[j].shifted.row(meeting.stays[j].still).transpose() +
+                     base_T_object.translation);
+    mean += places.back() / exemplars.size();
   }
-  // The start is where the hand rested, not where it met something.
-  if (contact.first == 0) return std::nullopt;
-  return contact;
+  double absolute = 0;
+  for (const Eigen::Vector3d& place : places) {
+    absolute += (place - mean).squaredNorm() / exemplars.size();
+  }
+  const double relative = meeting.spread_m * meeting.spread_m;
+  return absolute > kLeastObjectivity * (absolute + relative);
+}
+
+std::vector<FoundContact> ContactsFromMotion(const Alignment& alignment, const Exemplars& exemplars,
+                                             int object) {
+  const std::vector<MeetingTrial> trials = MeetingTrials(alignment, exemplars, object);
+  const double widest_m = std::sqrt(ObjectVariance(exemplars, object).maxCoeff());
+  double extent_m = 0;
+  for (const MeetingTrial& trial : trials) {
+    extent_m = std::max(
+        extent_m, (trial.shifted.colwise().maxCoeff() - trial.shifted.colwise().minCoeff()).norm());
+  }
+  std::vector<FoundContact> found;
+  for (const Meeting& meeting : FindMeetings(trials)) {
+    if (!Converges(exemplars, trials, meeting, object, widest_m, extent_m)) continue;
+    FoundContact contact{.span = {.object = object}, .windows = {}, .spread_m = meeting.spread_m};
+    ContactWindow mean;
+    for (std::size_t j = 0; j < trials.size(); ++j) {
+      const double last = static_cast<double>(trials[j].shifted.rows() - 1);
+      const Stay& stay = meeting.stays[j];
+      const ExemplarTrial& trial = exemplars.trials[j];
+      contact.windows.push_back({CommonFrame(trial, stay.first / last),
+                                 CommonFrame(trial, stay.still / last),
+                                 CommonFrame(trial, stay.last / last)});
+      mean.first += contact.windows.back().first / exemplars.size();
+      mean.still += contact.windows.back().still / exemplars.size();
+      mean.last += contact.windows.back().last / exemplars.size();
+    }
+    contact.span.first = static_cast<int>(std::lround(mean.first));
+    contact.span.meets = static_cast<int>(std::lround(mean.still));
+    contact.span.last = static_cast<int>(std::lround(mean.last));
+    found.push_back(std::move(contact));
+  }
+  return found;
+}
+
+enum class PointModel { kShifted, kTurned, kTurnedWithOffset };
+
+// Least squares; the offset is held small where the objects' turns do not tell it from the point.
+ContactPoint FitPoint(const std::vector<Eigen::Vector3d>& places,
+                      const std::vector<geometry::Pose>& objects, PointModel model) {
+  const auto n = static_cast<Eigen::Index>(places.size());
+  ContactPoint point;
+  point.turns = model != PointModel::kShifted;
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(3 * n, 6);
+  Eigen::VectorXd values(3 * n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const geometry::Pose& object = objects[static_cast<std::size_t>(j)];
+    design.block<3, 3>(3 * j, 0) =
+        point.turns ? object.rotation.toRotationMatrix() : Eigen::Matrix3d::Identity().eval();
+    if (model == PointModel::kTurnedWithOffset) {
+      design.block<3, 3>(3 * j, 3).setIdentity();
+    }
+    values.segment<3>(3 * j) = places[static_cast<std::size_t>(j)] - object.translation;
+  }
+  Eigen::MatrixXd normal = design.transpose() * design;
+  normal.bottomRightCorner<3, 3>().diagonal().array() += kOffsetRidge * static_cast<double>(n);
+  const Eigen::VectorXd solved = normal.ldlt().solve(design.transpose() * values);
+  point.object_p_contact = solved.head<3>();
+  point.base_offset = solved.tail<3>();
+  double squared = 0;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    squared += (point.At(objects[k]) - places[k]).squaredNorm();
+  }
+  point.spread_m = std::sqrt(squared / static_cast<double>(n));
+  return point;
+}
+
+double LeftOutError(const std::vector<Eigen::Vector3d>& places,
+                    const std::vector<geometry::Pose>& objects, PointModel model) {
+  const std::size_t count = std::min<std::size_t>(places.size(), kMostRefits);
+  double squared = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t out = k * places.size() / count;
+    std::vector<Eigen::Vector3d> other_places = places;
+    std::vector<geometry::Pose> other_objects = objects;
+    other_places.erase(other_places.begin() + static_cast<std::ptrdiff_t>(out));
+    other_objects.erase(other_objects.begin() + static_cast<std::ptrdiff_t>(out));
+    squared +=
+        (FitPoint(other_places, other_objects, model).At(objects[out]) - places[out]).squaredNorm();
+  }
+  return std::sqrt(squared / static_cast<double>(count));
+}
+
+// Where each trial's tool was, base frame.
+std::vector<Eigen::Vector3d> ContactPlaces(const Exemplars& exemplars, const ContactSpan& contact) {
+  // The contact's place in the list, by which trials know their own window.
+  const auto at = std::find_if(exemplars.contacts.begin(), exemplars.contacts.end(),
+                               [&](const ContactSpan& other) {
+                                 return other.object == contact.object &&
+                                        other.first == contact.first && other.last == contact.last;
+                               });
+  const auto index = static_cast<std::size_t>(at - exemplars.contacts.begin());
+  std::vector<Eigen::Vector3d> places;
+  for (const ExemplarTrial& trial : exemplars.trials) {
+    double frame = contact.meets;
+    if (index < trial.own_contacts.size()) frame = trial.own_contacts[index].still;
+    const auto whole = std::min(static_cast<std::size_t>(frame), trial.tool.size() - 1);
+    const std::size_t next = std::min(whole + 1, trial.tool.size() - 1);
+    const double s = frame - static_cast<double>(whole);
+    places.push_back((1 - s) * trial.tool[whole].translation + s * trial.tool[next].translation);
+  }
+  return places;
 }
 
 }  // namespace
 
-std::vector<ContactSpan> FindContacts(const Exemplars& exemplars) {
-  if (exemplars.objects() == 0) return {};
-  std::vector<ContactSpan> contacts = ContactsFromTouch(exemplars);
-  if (!contacts.empty() || !exemplars.has_tool || exemplars.size() < 2) return contacts;
+void FindContacts(const Alignment& alignment, Exemplars& exemplars) {
+  exemplars.contacts.clear();
+  for (ExemplarTrial& trial : exemplars.trials) trial.own_contacts.clear();
+  if (exemplars.objects() == 0) return;
+  exemplars.contacts = ContactsFromTouch(exemplars);
+  if (!exemplars.contacts.empty() || !exemplars.has_tool) return;
+  std::vector<FoundContact> found;
   for (int o = 0; o < exemplars.objects(); ++o) {
-    if (const std::optional<ContactSpan> contact = ContactFromSpread(exemplars, o)) {
-      contacts.push_back(*contact);
+    for (FoundContact& contact : ContactsFromMotion(alignment, exemplars, o)) {
+      found.push_back(std::move(contact));
     }
   }
-  std::sort(contacts.begin(), contacts.end(),
-            [](const ContactSpan& a, const ContactSpan& b) { return a.first < b.first; });
-  return contacts;
+  // The tool is at one object at a time: of those that it seems to meet at once, the one that the
+  // trials agree on most.
+  std::stable_sort(found.begin(), found.end(), [](const FoundContact& a, const FoundContact& b) {
+    return a.spread_m < b.spread_m;
+  });
+  std::vector<FoundContact> kept;
+  for (FoundContact& contact : found) {
+    const bool apart = std::all_of(kept.begin(), kept.end(), [&](const FoundContact& other) {
+      for (std::size_t j = 0; j < contact.windows.size(); ++j) {
+        if (contact.windows[j].first <= other.windows[j].last &&
+            contact.windows[j].last >= other.windows[j].first) {
+          return false;
+        }
+      }
+      return contact.span.first > other.span.last || contact.span.last < other.span.first;
+    });
+    if (apart) kept.push_back(std::move(contact));
+  }
+  std::sort(kept.begin(), kept.end(), [](const FoundContact& a, const FoundContact& b) {
+    return a.span.first < b.span.first;
+  });
+  for (const FoundContact& contact : kept) {
+    exemplars.contacts.push_back(contact.span);
+    for (std::size_t j = 0; j < exemplars.trials.size(); ++j) {
+      exemplars.trials[j].own_contacts.push_back(contact.windows[j]);
+    }
+  }
 }
 
 ContactPoint MeanContactPoint(const Exemplars& exemplars, const ContactSpan& contact) {
-  const auto variance_at = [&](const std::vector<Eigen::MatrixXd>& paths) {
-    return PathVariance(paths)[contact.first];
-  };
-  std::vector<Eigen::MatrixXd> paths = ShiftedPaths(exemplars, contact.object);
-  ContactPoint point;
-  double variance = variance_at(paths);
+  const std::vector<Eigen::Vector3d> places = ContactPlaces(exemplars, contact);
+  std::vector<geometry::Pose> objects;
+  for (const ExemplarTrial& trial : exemplars.trials) {
+    objects.push_back(trial.ObjectAt(contact.object, contact.meets));
+  }
+  const double slack_m = 1e-9;
+  PointModel model = PointModel::kShifted;
   if (exemplars.object_has_orientation[static_cast<std::size_t>(contact.object)]) {
-    std::vector<Eigen::MatrixXd> turned = TurnedPaths(exemplars, contact.object);
-    const double turned_variance = variance_at(turned);
     // Equal when the object was never turned: then the whole frame is the safer reading.
-    if (turned_variance <= variance * (1 + 1e-9) + 1e-18) {
-      point.turns = true;
-      variance = turned_variance;
-      paths = std::move(turned);
+    const double shifted = FitPoint(places, objects, PointModel::kShifted).spread_m;
+    const double turned = FitPoint(places, objects, PointModel::kTurned).spread_m;
+    if (turned <= shifted * (1 + 1e-9) + slack_m) model = PointModel::kTurned;
+    if (!contact.touch_measured && places.size() >= kLeastForOffset &&
+        LeftOutError(places, objects, PointModel::kTurnedWithOffset) <
+            kClearlyCloser * LeftOutError(places, objects, model) - slack_m) {
+      model = PointModel::kTurnedWithOffset;
     }
   }
-  for (const Eigen::MatrixXd& path : paths) {
-    point.object_p_contact += path.row(contact.first).transpose() / exemplars.size();
-  }
-  point.spread_m = std::sqrt(variance);
+  ContactPoint point = FitPoint(places, objects, model);
+  if (places.size() > 1) point.left_out_m = LeftOutError(places, objects, model);
   return point;
 }
 

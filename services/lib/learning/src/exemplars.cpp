@@ -184,7 +184,7 @@ Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
     if (exemplars.object_names[static_cast<std::size_t>(o)] == target) exemplars.target = o;
   }
   AlignTouches(exemplars);
-  exemplars.contacts = FindContacts(exemplars);
+  FindContacts(alignment, exemplars);
   for (ExemplarTrial& trial : exemplars.trials) {
     for (int o = 0; o < exemplars.objects(); ++o) {
       std::vector<geometry::Pose>& path = trial.moving[static_cast<std::size_t>(o)];

@@ -21,6 +21,13 @@ struct Situation {
   std::vector<geometry::Pose> base_T_object;   ///< as Exemplars::object_names
 };
 
+/// When one trial met an object, in frames of the common time base.
+struct ContactWindow {
+  double first = 0;
+  double still = 0;  ///< where it rested most
+  double last = 0;
+};
+
 /// One aligned trial. Paths have Exemplars::frames rows.
 struct ExemplarTrial {
   Situation situation;               ///< object poses at first contact, or where they rested
@@ -29,6 +36,9 @@ struct ExemplarTrial {
   Eigen::VectorXd hand;              ///< frames, or empty
   Eigen::VectorXd touch_n;           ///< frames, or empty
   Eigen::VectorXd own_time;          ///< frames: part of the own duration, 0 to 1
+  /// The trial's own windows of Exemplars::contacts, in (fractional) frames; empty where touch
+  /// tells them.
+  std::vector<ContactWindow> own_contacts;
   /// Poses over time of each object that moved, the reference frame of the tool at each frame;
   /// empty for one that rested.
   std::vector<std::vector<geometry::Pose>> moving;
@@ -46,6 +56,9 @@ struct ContactSpan {
   int first = 0;
   int last = 0;
   bool touch_measured = false;
+  /// The frame at which the place of contact counts: the onset of touch, else the stillest.
+  int meets = 0;
+  bool at_one_time = false;  ///< the trials are aligned so that all are in contact at these frames
 };
 
 struct Exemplars {

@@ -9,6 +9,10 @@
 namespace exemplar::learning {
 namespace {
 
+// Contacts found without touch are an equality where the trials rest and the mean contact point
+// predicts left-out trials as well as the path does, to this.
+constexpr double kExact_m = 1e-4;
+
 double Smoothstep(double s) {
   const double x = std::clamp(s, 0.0, 1.0);
   return x * x * (3 - 2 * x);
@@ -72,6 +76,17 @@ FramesModel::FramesModel(const Exemplars& exemplars)
   rotation_.emplace(exemplars, *path_);
   for (const ContactSpan& contact : contacts_) {
     contact_points_.push_back(MeanContactPoint(exemplars, contact));
+    double squared = 0;
+    for (int j = 0; j < n; ++j) {
+      const Eigen::Vector3d place = exemplars.trials[static_cast<std::size_t>(j)]
+                                        .tool[static_cast<std::size_t>(contact.meets)]
+                                        .translation;
+      squared += (path_->LeftOut(j, contact.meets) - place).squaredNorm() / n;
+    }
+    const double path_error_m = std::sqrt(squared);
+    equality_.push_back(contact.touch_measured || n == 1 ||
+                        contact_points_.back().left_out_m <=
+                            (contact.last > contact.first ? path_error_m : 0) + kExact_m);
   }
   std::vector<Eigen::MatrixXd> base;
   for (int j = 0; j < n; ++j) base.push_back(exemplars.BasePath(j));
@@ -94,14 +109,11 @@ Eigen::VectorXd FramesModel::StyleWeights(const Situation& situation) const {
 void FramesModel::MeetContacts(const Situation& situation, Prediction& prediction) const {
   for (std::size_t k = 0; k < contacts_.size(); ++k) {
     const ContactSpan& span = contacts_[k];
-    Eigen::Vector3d& reached = prediction.tool[static_cast<std::size_t>(span.first)].translation;
-    if (span.touch_measured) {
+    Eigen::Vector3d& reached = prediction.tool[static_cast<std::size_t>(span.meets)].translation;
+    if (equality_[k]) {
       const geometry::Pose& base_T_object =
           situation.base_T_object[static_cast<std::size_t>(span.object)];
-      const ContactPoint& point = contact_points_[k];
-      const Eigen::Vector3d wanted = point.turns
-                                         ? base_T_object * point.object_p_contact
-                                         : base_T_object.translation + point.object_p_contact;
+      const Eigen::Vector3d wanted = contact_points_[k].At(base_T_object);
       const Eigen::Vector3d shift = wanted - reached;
       const int before = k > 0 ? contacts_[k - 1].last : 0;
       const int after = k + 1 < contacts_.size() ? contacts_[k + 1].first : frames_ - 1;

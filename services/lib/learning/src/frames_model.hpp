@@ -13,7 +13,7 @@
 namespace exemplar::learning {
 
 /// Begins exactly at the situation's start; meets the trials' mean contact point where touch was
-/// measured. Immutable.
+/// measured, or where that point predicts left-out trials as well as the path does. Immutable.
 class FramesModel final : public Model {
  public:
   explicit FramesModel(const Exemplars& exemplars);
@@ -32,6 +32,7 @@ class FramesModel final : public Model {
   int joints_count_ = 0;
   std::vector<ContactSpan> contacts_;
   std::vector<ContactPoint> contact_points_;
+  std::vector<bool> equality_;  // the path meets the contact point exactly
   std::optional<PathFrames> path_;
   std::optional<RotationFrames> rotation_;
   std::optional<CardinalRbf> style_;  // of joints and hand, over the target's position

@@ -42,12 +42,14 @@ std::vector<geometry::Pose> LeftOutPath(
 
 Exemplars ExemplarsFor(const std::string& choice, Exemplars exemplars) {
   if (choice == kFramesByLengthChoice) return AlignedByLength(exemplars);
+  if (choice == kFramesByContactChoice) return AlignedByLength(AlignedAtContacts(exemplars));
   return exemplars;
 }
 
 std::unique_ptr<const Model> FitModel(const std::string& choice, const Exemplars& exemplars,
                                       std::shared_ptr<const demonstration::ToolKinematics> tool) {
-  if (choice == kFramesChoice || choice == kFramesByLengthChoice) {
+  if (choice == kFramesChoice || choice == kFramesByLengthChoice ||
+      choice == kFramesByContactChoice) {
     return std::make_unique<FramesModel>(exemplars);
   }
   return std::make_unique<PaperModel>(exemplars, std::move(tool));

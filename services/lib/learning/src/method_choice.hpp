@@ -17,6 +17,7 @@ namespace exemplar::learning {
 inline constexpr const char* kPaperChoice = "paper";
 inline constexpr const char* kFramesChoice = "frames";
 inline constexpr const char* kFramesByLengthChoice = "frames by length";
+inline constexpr const char* kFramesByContactChoice = "frames by contact and length";
 
 /// The exemplars as the chosen method aligns them.
 Exemplars ExemplarsFor(const std::string& choice, Exemplars exemplars);

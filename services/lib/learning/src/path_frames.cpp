@@ -221,6 +221,14 @@ Eigen::Matrix3Xd PathFrames::LeftOut(int trial) const {
   return path;
 }
 
+Eigen::Vector3d PathFrames::LeftOut(int trial, int frame) const {
+  Eigen::Vector3d place = values_.block<3, 1>(3 * trial, frame);
+  for (const Member& member : members_) {
+    place -= member.share * member.kriging.left_out_errors().block<3, 1>(3 * trial, frame);
+  }
+  return place + situations_[static_cast<std::size_t>(trial)].object;
+}
+
 std::string PathFrames::Describe() const {
   const FrameGains& best = members_.front().gains;
   std::string text = turns_ ? "start, turned object" : "start, object";

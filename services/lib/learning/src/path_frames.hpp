@@ -46,6 +46,7 @@ class PathFrames {
   Answer Predict(const FrameSituation& situation) const;
   /// What a trial of the training set is predicted from the others, 3 x frames: closed form.
   Eigen::Matrix3Xd LeftOut(int trial) const;
+  Eigen::Vector3d LeftOut(int trial, int frame) const;
 
   /// a(t) / a(0), clamped to [0, 1]: 1 in the start's frame, 0 in the object's.
   const Eigen::VectorXd& start_share() const { return start_share_; }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact.hpp"
 #include "exemplar/learning/touch.hpp"
 
 namespace exemplar::learning {
@@ -11,6 +10,8 @@ namespace {
 
 // Part of time in a trial's phase; the rest is path length. A pause still takes its share.
 constexpr double kTimePart = 0.3;
+// Frames between two knots of an alignment.
+constexpr double kLeastGap = 2;
 
 // Value at `x` of the polyline through (xs, ys), xs increasing; held outside.
 double Lookup(std::span<const double> xs, std::span<const double> ys, double x) {
@@ -34,7 +35,7 @@ std::vector<double> Phase(const Exemplars& exemplars, const ExemplarTrial& trial
   const int n = exemplars.frames;
   std::vector<int> anchors = {0};
   for (const ContactSpan& contact : exemplars.contacts) {
-    if (!contact.touch_measured) continue;
+    if (!contact.at_one_time) continue;
     for (const int frame : {contact.first, contact.last}) {
       if (frame > anchors.back() && frame < n - 1) anchors.push_back(frame);
     }
@@ -99,8 +100,58 @@ ExemplarTrial Rewarped(const ExemplarTrial& trial, std::span<const double> from)
   if (trial.hand.size() > 0) result.hand = mix(trial.hand);
   if (trial.touch_n.size() > 0) result.touch_n = mix(trial.touch_n);
   result.own_time = mix(trial.own_time);
+  if (!trial.own_contacts.empty()) {
+    const std::vector<double> to = Frames(static_cast<int>(from.size()));
+    for (ContactWindow& window : result.own_contacts) {
+      for (double* frame : {&window.first, &window.still, &window.last}) {
+        *frame = Lookup(from, to, *frame);
+      }
+    }
+  }
   return result;
 }
+
+namespace {
+
+// Contacts known from the trials' own windows lie at their means.
+void SetMeanSpans(Exemplars& exemplars) {
+  for (std::size_t k = 0; k < exemplars.trials[0].own_contacts.size(); ++k) {
+    ContactWindow mean;
+    for (const ExemplarTrial& trial : exemplars.trials) {
+      mean.first += trial.own_contacts[k].first / exemplars.size();
+      mean.still += trial.own_contacts[k].still / exemplars.size();
+      mean.last += trial.own_contacts[k].last / exemplars.size();
+    }
+    exemplars.contacts[k].first = static_cast<int>(std::lround(mean.first));
+    exemplars.contacts[k].meets = static_cast<int>(std::lround(mean.still));
+    exemplars.contacts[k].last = static_cast<int>(std::lround(mean.last));
+  }
+}
+
+// Warps each trial so that its knots (own frames, start and end among them) fall on their mean over
+// the trials. False, and nothing done, where the mean leaves no frame between two of them.
+bool AlignKnots(const std::vector<std::vector<double>>& knots, Exemplars& exemplars) {
+  std::vector<double> mean(knots.front().size(), 0.0);
+  for (const std::vector<double>& own : knots) {
+    for (std::size_t k = 0; k < mean.size(); ++k) {
+      mean[k] += own[k] / static_cast<double>(knots.size());
+    }
+  }
+  // Whole frames, so that the onset is a sample of the common time base; still increasing.
+  for (double& frame : mean) frame = std::round(frame);
+  for (std::size_t k = 1; k < mean.size(); ++k) {
+    if (mean[k] <= mean[k - 1]) return false;
+  }
+  const std::vector<double> all = Frames(exemplars.frames);
+  for (std::size_t j = 0; j < knots.size(); ++j) {
+    std::vector<double> from;
+    for (const double frame : all) from.push_back(Lookup(mean, knots[j], frame));
+    exemplars.trials[j] = Rewarped(exemplars.trials[j], from);
+  }
+  return true;
+}
+
+}  // namespace
 
 void AlignTouches(Exemplars& exemplars) {
   std::vector<std::vector<double>> knots;
@@ -117,23 +168,36 @@ void AlignTouches(Exemplars& exemplars) {
     knots.push_back(std::move(own));
   }
   if (knots.front().size() == 2) return;
-  std::vector<double> mean(knots.front().size(), 0.0);
-  for (const std::vector<double>& own : knots) {
-    for (std::size_t k = 0; k < mean.size(); ++k) {
-      mean[k] += own[k] / static_cast<double>(knots.size());
+  AlignKnots(knots, exemplars);
+}
+
+Exemplars AlignedAtContacts(const Exemplars& exemplars) {
+  Exemplars result = exemplars;
+  const std::size_t count = exemplars.trials[0].own_contacts.size();
+  if (count == 0) return result;
+  // Ends that the trials reach with the recording are knots already.
+  const double end = exemplars.frames - 1;
+  std::vector<std::vector<double>> knots(exemplars.trials.size(), {0.0});
+  for (std::size_t k = 0; k < count; ++k) {
+    for (const bool last : {false, true}) {
+      bool inside = true;
+      for (std::size_t j = 0; j < knots.size(); ++j) {
+        const ContactWindow& window = exemplars.trials[j].own_contacts[k];
+        const double frame = last ? window.last : window.first;
+        inside = inside && frame > knots[j].back() + kLeastGap && frame < end - kLeastGap;
+      }
+      if (!inside) continue;
+      for (std::size_t j = 0; j < knots.size(); ++j) {
+        const ContactWindow& window = exemplars.trials[j].own_contacts[k];
+        knots[j].push_back(last ? window.last : window.first);
+      }
     }
   }
-  // Whole frames, so that the onset is a sample of the common time base; still increasing.
-  for (double& frame : mean) frame = std::round(frame);
-  for (std::size_t k = 1; k < mean.size(); ++k) {
-    if (mean[k] <= mean[k - 1]) return;
-  }
-  const std::vector<double> all = Frames(exemplars.frames);
-  for (std::size_t j = 0; j < knots.size(); ++j) {
-    std::vector<double> from;
-    for (const double frame : all) from.push_back(Lookup(mean, knots[j], frame));
-    exemplars.trials[j] = Rewarped(exemplars.trials[j], from);
-  }
+  for (std::vector<double>& own : knots) own.push_back(end);
+  if (knots.front().size() == 2 || !AlignKnots(knots, result)) return result;
+  SetMeanSpans(result);
+  for (ContactSpan& contact : result.contacts) contact.at_one_time = true;
+  return result;
 }
 
 Exemplars AlignedByLength(const Exemplars& exemplars) {
@@ -161,7 +225,7 @@ Exemplars AlignedByLength(const Exemplars& exemplars) {
     from.back() = n - 1;
     result.trials[j] = Rewarped(exemplars.trials[j], from);
   }
-  result.contacts = FindContacts(result);
+  SetMeanSpans(result);
   return result;
 }
 

@@ -15,9 +15,13 @@ ExemplarTrial Rewarped(const ExemplarTrial& trial, std::span<const double> from)
 /// them, so that contact is at one frame in all. Contacts are left to be found again.
 void AlignTouches(Exemplars& exemplars);
 
+/// Brings each trial's own contact windows onto their mean, so that all rest at the object at the
+/// same frames. As it was where the contacts come from touch, or there is none.
+Exemplars AlignedAtContacts(const Exemplars& exemplars);
+
 /// Brings the trials to the same part of their way (mostly path length, partly time, between
-/// measured contacts), at the mean time of that part: people who pause at different places are then
-/// compared where they are, not when. Contacts are found again.
+/// contacts), at the mean time of that part: people who pause at different places are then compared
+/// where they are, not when. Contacts keep their frames.
 Exemplars AlignedByLength(const Exemplars& exemplars);
 
 }  // namespace exemplar::learning

@@ -17,7 +17,8 @@ namespace {
 // A trial whose left-out error is this many times the median is called an outlier.
 constexpr double kOutlierFactor = 3;
 
-// A method takes the place of the first one when its left-out error is below this part of it.
+// A method takes the place of those by path length when its left-out error is below this part of
+// theirs.
 constexpr double kClearlyBetter = 0.8;
 
 Error Cancelled() { return {ErrorCode::kCancelled, "learning was cancelled"}; }
@@ -82,23 +83,31 @@ void NameTarget(const Exemplars& exemplars, SkillReport& report) {
   }
 }
 
-std::vector<std::string> ChoicesOf(Method method) {
+std::vector<std::string> ChoicesOf(Method method, const Exemplars& exemplars) {
   if (method == Method::kPaper) return {kPaperChoice};
-  if (method == Method::kFrames) return {kFramesByLengthChoice, kFramesChoice};
-  return {kFramesByLengthChoice, kFramesChoice, kPaperChoice};
+  std::vector<std::string> choices = {kFramesByLengthChoice, kFramesChoice};
+  // Where contacts come from the motion, they are knots of a further alignment.
+  if (!exemplars.trials[0].own_contacts.empty()) {
+    choices.insert(choices.begin(), kFramesByContactChoice);
+  }
+  if (method == Method::kAuto) choices.push_back(kPaperChoice);
+  return choices;
 }
 
-// The least left-out error of path and end together. The first gives way only to one that is
-// clearly better, since a few trials tell small differences badly (DECISIONS.md says how it came
+// The least left-out error of path and end together. Those by length give way only to one that
+// is clearly better, since a few trials tell small differences badly (DECISIONS.md says how it came
 // first).
 std::string Choose(Method method, const Exemplars& exemplars, std::vector<MethodScore>& scores) {
   if (scores.empty()) {
     const bool frames = method != Method::kPaper && exemplars.has_tool;
-    return frames || method == Method::kFrames ? kFramesByLengthChoice : kPaperChoice;
+    return frames || method == Method::kFrames ? ChoicesOf(method, exemplars).front()
+                                               : kPaperChoice;
   }
   const auto error = [&](const MethodScore& score) {
     return (score.frechet_m + score.end_error_m) *
-           (&score == &scores.front() ? kClearlyBetter : 1.0);
+           (score.method == kFramesByContactChoice || score.method == kFramesByLengthChoice
+                ? kClearlyBetter
+                : 1.0);
   };
   MethodScore& best = *std::min_element(
       scores.begin(), scores.end(),
@@ -229,7 +238,7 @@ Result<Skill> LearnSkill(std::span<const NamedTrial> trials, const LearnOptions&
   Exemplars exemplars = BuildExemplars(*alignment, options.target, tool.get());
   NameTarget(exemplars, report);
   report.methods = ScoreMethods(
-      ChoicesOf(options.method), exemplars, tool,
+      ChoicesOf(options.method, exemplars), exemplars, tool,
       [&](double fraction, std::string_view step) { tell(0.7 + 0.3 * fraction, step); }, stop);
   if (stop.stop_requested()) return Cancelled();
   const std::string choice = Choose(options.method, exemplars, report.methods);
