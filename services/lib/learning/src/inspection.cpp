@@ -18,11 +18,6 @@ std::string ObstacleOf(const Exemplars& exemplars) {
   return {};
 }
 
-Eigen::Vector3d PointAt(const ContactPoint& contact, const geometry::Pose& base_T_target) {
-  return contact.turns ? base_T_target * contact.object_p_contact
-                       : base_T_target.translation + contact.object_p_contact;
-}
-
 // The paper's method on the skill's trials, whatever method the skill itself uses.
 class PaperView {
  public:
@@ -77,7 +72,7 @@ class PaperView {
   }
 
   Eigen::Vector3d ContactPointAt(const geometry::Pose& base_T_target) const {
-    return PointAt(contact_, base_T_target);
+    return contact_.At(base_T_target);
   }
 
   Situation SituationOf(const demonstration::SkillQuery& query) const {
@@ -266,8 +261,7 @@ ContactErrorMap MapErrors(const Skill& skill, const PaperView& view,
       if (paper) continue;
       if (const auto motion = Answer(skill, query)) {
         const Eigen::Vector3d tool = motion->base_T_tool[answer.frame].translation;
-        map.answer(r, c) =
-            (tool - (answer.point ? PointAt(*answer.point, target) : contact)).norm();
+        map.answer(r, c) = (tool - (answer.point ? answer.point->At(target) : contact)).norm();
       }
     }
   }
