@@ -10,6 +10,8 @@ namespace {
 
 constexpr double kShortestRamp_s = 0.02;
 constexpr double kLongestRamp_s = 8;
+/// A stop takes at most this long, and begins at once.
+constexpr double kLongestStop_s = 0.5;
 /// Each ramp that is tried is longer by this.
 constexpr double kLonger = 1.2;
 constexpr double kCheckStep_s = 0.004;
@@ -62,21 +64,29 @@ void PathPlayer::Advance(double elapsed_s, double target_rate, double slope_per_
 
 void PathPlayer::Begin(double target_rate, double slope_per_s) {
   const double shortest = std::max(std::abs(target_rate - rate_) / slope_per_s, kShortestRamp_s);
-  for (double duration = shortest; duration <= kLongestRamp_s; duration *= kLonger) {
-    const Ramp ramp = RampTo(target_rate, duration);
+  const double longest = target_rate == 0 ? std::max(shortest, kLongestStop_s) : kLongestRamp_s;
+  for (double duration = shortest; duration <= longest; duration *= kLonger) {
+    const Ramp ramp = RampTo(target_rate, duration, ramp_.Slope(ramp_s_), ramp_.Bend(ramp_s_));
     if (!KeepsLimits(ramp)) continue;
-    ramp_ = ramp;
-    ramp_s_ = 0;
-    ramp_begin_time_s_ = time_s_;
+    Follow(ramp, true);
     return;
   }
+  // Without the present slope the rate only falls, so that velocity at least stays within limits.
+  if (target_rate == 0) Follow(RampTo(target_rate, longest, 0, 0), false);
 }
 
-PathPlayer::Ramp PathPlayer::RampTo(double target_rate, double duration_s) const {
-  // From the present rate, slope and bend to the target's rate without slope and bend.
+void PathPlayer::Follow(const Ramp& ramp, bool keeps_limits) {
+  keeps_limits_ = keeps_limits;
+  ramp_ = ramp;
+  ramp_s_ = 0;
+  ramp_begin_time_s_ = time_s_;
+}
+
+PathPlayer::Ramp PathPlayer::RampTo(double target_rate, double duration_s, double slope_per_s,
+                                    double bend_per_s2) const {
   const double d = duration_s;
-  const double slope = ramp_.Slope(ramp_s_) * d;
-  const double bend = ramp_.Bend(ramp_s_) * d * d;
+  const double slope = slope_per_s * d;
+  const double bend = bend_per_s2 * d * d;
   const double missing = target_rate - rate_;
   Ramp ramp;
   ramp.duration_s = d;

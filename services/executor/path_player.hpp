@@ -10,7 +10,9 @@ namespace exemplar::executor {
 
 /// Speed changes act along the path only: the robot never leaves it. They are as quick as the
 /// joints' velocity, acceleration and jerk limits allow at that place of the path, checked over the
-/// whole change before it begins; until one is possible the present one goes on.
+/// whole change before it begins; until one is possible the present one goes on. A stop (rate 0)
+/// never waits: where none within half a second keeps the limits, it takes half a second and breaks
+/// those of acceleration and jerk.
 /// Thread-compatible; does not allocate after construction.
 class PathPlayer {
  public:
@@ -25,6 +27,8 @@ class PathPlayer {
   double time_s() const { return time_s_; }  ///< on the plan's time
   double rate() const { return rate_; }
   bool at_end() const { return time_s_ >= trajectory_.duration_s(); }
+  /// False while a stop is on its way that had to break limits of acceleration or jerk.
+  bool keeps_limits() const { return keeps_limits_; }
   /// Velocities are those that the present rate makes.
   void Evaluate(Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity) const;
 
@@ -42,7 +46,9 @@ class PathPlayer {
   };
 
   void Begin(double target_rate, double slope_per_s);
-  Ramp RampTo(double target_rate, double duration_s) const;
+  void Follow(const Ramp& ramp, bool keeps_limits);
+  /// From the present rate and the given slope and bend to a rate that stays.
+  Ramp RampTo(double target_rate, double duration_s, double slope_per_s, double bend_per_s2) const;
   bool KeepsLimits(const Ramp& ramp) const;
   bool KeepsLimits(double path_time_s, double rate, double slope, double bend) const;
 
@@ -53,6 +59,7 @@ class PathPlayer {
   Ramp ramp_;
   double ramp_s_ = 0;  ///< since the ramp began
   double ramp_begin_time_s_ = 0;
+  bool keeps_limits_ = true;
 };
 
 }  // namespace exemplar::executor
