@@ -69,7 +69,7 @@ TEST(BoundingCapsule, ContainsEveryPointOfEveryRobotsGeometry) {
     EXPECT_FALSE(parts.empty());
     for (const RobotPart& part : parts) {
       for (int i = 0; i < 2000; ++i) {
-        const Eigen::Vector3d p = part.link_T_shape * part.shape.Support(RandomDirection(rng));
+        const Eigen::Vector3d p = part.link_T_shape * part.body.hull.Support(RandomDirection(rng));
         ASSERT_LE(Outside(part.capsule, p), 1e-9) << model.name << " " << part.link;
       }
     }

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <vector>
 
+#include "body.hpp"
 #include "convex_hull.hpp"
 #include "convex_shape.hpp"
 #include "exemplar/base/rng.hpp"
@@ -288,7 +289,7 @@ TEST(Mesh, OfABoxMeasuresLikeTheBox) {
   ASSERT_TRUE(hull.ok());
   const std::string text = TextStl(hull->vertices, hull->faces);
   const ConvexShape mesh =
-      *ConvexShape::Create(Mesh{WriteTemporary("box.stl", text).string(), {1, 1, 1}});
+      MakeBody(Mesh{WriteTemporary("box.stl", text).string(), {1, 1, 1}})->hull;
   const ConvexShape box = *ConvexShape::Create(Box{2 * half});
   for (int i = 0; i < 200; ++i) {
     const ConvexShape other = *ConvexShape::Create(RandomShape(rng, i % 4));
@@ -307,8 +308,8 @@ TEST(Mesh, OfABoxMeasuresLikeTheBox) {
 TEST(Mesh, IsScaled) {
   const Result<Hull> hull = ConvexHull(BoxCorners({100, 100, 100}));
   const std::string text = TextStl(hull->vertices, hull->faces);
-  const ConvexShape mesh = *ConvexShape::Create(
-      Mesh{WriteTemporary("millimetres.stl", text).string(), {0.001, 0.001, 0.001}});
+  const ConvexShape mesh =
+      MakeBody(Mesh{WriteTemporary("millimetres.stl", text).string(), {0.001, 0.001, 0.001}})->hull;
   EXPECT_NEAR(mesh.Support(Eigen::Vector3d::UnitX()).x(), 0.1, 1e-12);
 }
 

@@ -1,238 +1,184 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "checker_impl.hpp"
 #include "exemplar/base/rng.hpp"
-#include "exemplar/collision/scene.hpp"
-#include "exemplar/kinematics/chain.hpp"
-#include "pairs.hpp"
+#include "exemplar/base/text.hpp"
 
 namespace exemplar::collision {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Bisection stops at this fraction of the interval.
-constexpr double kSmallestInterval = 1e-4;
 
-/// The robot's parts at one configuration, and the distances asked for so far.
-struct Snapshot {
-  double s = 0;
-  std::vector<Placement> placements;
-  std::vector<Bounds> bounds;
-  std::vector<BoundingCapsule> capsules;
-  std::vector<double> distances;  ///< one a pair, kUnknown until asked
-};
+Eigen::VectorXd RandomState(const kinematics::RobotModel& model, Rng& rng) {
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.joints.size()));
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    if (model.joints[j].type == kinematics::JointType::kFixed) continue;
+    const kinematics::JointLimits& limits = model.joints[j].limits;
+    const double lower = std::isfinite(limits.lower) ? limits.lower : -M_PI;
+    const double upper = std::isfinite(limits.upper) ? limits.upper : M_PI;
+    q[static_cast<Eigen::Index>(j)] = rng.Uniform(lower, upper);
+  }
+  return q;
+}
 
 }  // namespace
 
-struct CollisionChecker::Impl {
-  kinematics::RobotModel model;
-  CheckerOptions options;
-  Scene scene;
-  std::vector<RobotPart> robot_parts;
-  std::vector<ScenePart> scene_parts;
-  std::vector<Pair> self_pairs;
-  std::vector<Pair> pairs;  ///< self_pairs, then robot parts against scene parts
-  // Scratch of one query: the class is thread-compatible.
-  mutable std::vector<geometry::Pose> base_T_links;
-  mutable Snapshot scratch;
-  mutable std::vector<std::pair<double, int>> queue;
+void CollisionChecker::Impl::Take(Scene new_scene, std::vector<ScenePart> parts,
+                                  std::vector<RobotPart> held) {
+  scene = std::move(new_scene);
+  scene_parts = std::move(parts);
+  robot_parts.erase(robot_parts.begin() + static_cast<std::ptrdiff_t>(model_parts),
+                    robot_parts.end());
+  std::move(held.begin(), held.end(), std::back_inserter(robot_parts));
+  MakePairs();
+}
 
-  void Place(const Eigen::Ref<const Eigen::VectorXd>& q, Snapshot& snapshot) const {
-    kinematics::LinkPoses(model, q, base_T_links);
-    snapshot.placements.resize(robot_parts.size());
-    snapshot.bounds.resize(robot_parts.size());
-    snapshot.capsules.resize(robot_parts.size());
-    for (std::size_t i = 0; i < robot_parts.size(); ++i) {
-      const RobotPart& part = robot_parts[i];
-      snapshot.placements[i] = Placement::From(base_T_links[part.link] * part.link_T_shape);
-      snapshot.bounds[i] = part.shape.BoundsAt(snapshot.placements[i]);
-      snapshot.capsules[i] = part.capsule.At(Placement::From(base_T_links[part.link]));
+void CollisionChecker::Impl::MakePairs() {
+  pairs = model_pairs;
+  for (std::size_t h = model_parts; h < robot_parts.size(); ++h) {
+    const HeldObject& held = scene.held[h - model_parts];
+    const RobotPart& part = robot_parts[h];
+    for (std::size_t other = 0; other < h; ++other) {
+      const RobotPart& against = robot_parts[other];
+      const bool may_touch = std::find(held.touch_links.begin(), held.touch_links.end(),
+                                       against.name) != held.touch_links.end();
+      if (may_touch || !MoveAgainstEachOther(model, part.link, against.link)) continue;
+      pairs.push_back({static_cast<int>(other), static_cast<int>(h), false,
+                       LeversBetween(model, against, &part)});
     }
   }
-
-  double Padding(const Pair& pair) const {
-    return pair.scene ? options.padding_m : 2 * options.padding_m;
-  }
-
-  double LowerBound(const Pair& pair, const Snapshot& at) const {
-    const Bounds& other = pair.scene ? scene_parts[pair.second].bounds : at.bounds[pair.second];
-    return Distance(at.bounds[pair.first], other) - Padding(pair);
-  }
-
-  /// The better of the bounds by boxes and by capsules.
-  double TightBound(const Pair& pair, const Snapshot& at) const {
-    const BoundingCapsule& other =
-        pair.scene ? scene_parts[pair.second].capsule : at.capsules[pair.second];
-    Eigen::Vector3d on_first, on_second;
-    const double apart = Distance(at.capsules[pair.first], other, on_first, on_second);
-    return std::max(LowerBound(pair, at), apart - Padding(pair));
-  }
-
-  Separation Measure(const Pair& pair, const Snapshot& at) const {
-    const ConvexShape& first = robot_parts[pair.first].shape;
-    const Placement& first_at = at.placements[pair.first];
-    Separation found = pair.scene ? SignedDistance(first, first_at, scene_parts[pair.second].shape,
-                                                   scene_parts[pair.second].base_at)
-                                  : SignedDistance(first, first_at, robot_parts[pair.second].shape,
-                                                   at.placements[pair.second]);
-    found.distance_m -= Padding(pair);
-    return found;
-  }
-
-  /// The distance of a pair, measured once a snapshot.
-  double Measured(int pair, Snapshot& at) const {
-    double& known = at.distances[pair];
-    if (std::isnan(known)) known = Measure(pairs[pair], at).distance_m;
-    return known;
-  }
-
-  Clearance Describe(int index, const Snapshot& at) const {
-    const Pair& pair = pairs[index];
-    const Separation found = Measure(pair, at);
-    const std::string& second = pair.scene ? scene.objects[scene_parts[pair.second].object].name
-                                           : model.links[robot_parts[pair.second].link].name;
-    return {model.links[robot_parts[pair.first].link].name, second, found.distance_m, found.p_first,
-            found.p_second};
-  }
-
-  bool IsAllowed(const Pair& pair, const std::vector<AllowedTouch>& allowed) const {
-    if (!pair.scene) return false;
-    const std::string& link = model.links[robot_parts[pair.first].link].name;
-    const std::string& object = scene.objects[scene_parts[pair.second].object].name;
-    return std::any_of(allowed.begin(), allowed.end(), [&](const AllowedTouch& touch) {
-      return touch.link == link && touch.object == object;
-    });
-  }
-
-  void MakePairs() {
-    pairs = self_pairs;
-    for (std::size_t r = 0; r < robot_parts.size(); ++r) {
-      const std::vector<Lever> levers = LeversBetween(model, robot_parts[r], nullptr);
-      if (levers.empty()) continue;
-      for (std::size_t s = 0; s < scene_parts.size(); ++s) {
-        pairs.push_back({static_cast<int>(r), static_cast<int>(s), true, levers});
-      }
+  self_pairs = pairs.size();
+  for (std::size_t r = 0; r < robot_parts.size(); ++r) {
+    const std::vector<Lever> levers = LeversBetween(model, robot_parts[r], nullptr);
+    if (levers.empty()) continue;
+    for (std::size_t s = 0; s < scene_parts.size(); ++s) {
+      pairs.push_back({static_cast<int>(r), static_cast<int>(s), true, levers});
     }
   }
+}
 
-  Eigen::VectorXd RandomState(Rng& rng) const {
-    Eigen::VectorXd q = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.joints.size()));
-    for (std::size_t j = 0; j < model.joints.size(); ++j) {
-      if (model.joints[j].type == kinematics::JointType::kFixed) continue;
-      const kinematics::JointLimits& limits = model.joints[j].limits;
-      const double lower = std::isfinite(limits.lower) ? limits.lower : -M_PI;
-      const double upper = std::isfinite(limits.upper) ? limits.upper : M_PI;
-      q[static_cast<Eigen::Index>(j)] = rng.Uniform(lower, upper);
-    }
-    return q;
-  }
-
-  /// Removes the link pairs that touch in every one of the sampled states.
-  void LeaveOutTouching() {
-    if (options.sampled_allowed_states <= 0) return;
-    Rng rng(20261122);
-    const auto links_of = [&](const Pair& pair) {
-      return std::pair(robot_parts[pair.first].link, robot_parts[pair.second].link);
-    };
-    std::vector<std::pair<int, int>> touching;
-    for (const Pair& pair : self_pairs) touching.push_back(links_of(pair));
-    std::sort(touching.begin(), touching.end());
-    touching.erase(std::unique(touching.begin(), touching.end()), touching.end());
-    for (int state = 0; state < options.sampled_allowed_states && !touching.empty(); ++state) {
-      Place(RandomState(rng), scratch);
-      std::vector<std::pair<int, int>> still;
-      for (const Pair& pair : self_pairs) {
-        const std::pair<int, int> links = links_of(pair);
-        if (!std::binary_search(touching.begin(), touching.end(), links)) continue;
-        if (!still.empty() && still.back() == links) continue;
-        if (LowerBound(pair, scratch) > options.sampled_touch_distance_m) continue;
-        if (Measure(pair, scratch).distance_m <= options.sampled_touch_distance_m) {
-          still.push_back(links);
-        }
-      }
-      std::sort(still.begin(), still.end());
-      touching = std::move(still);
-    }
-    std::erase_if(self_pairs, [&](const Pair& pair) {
-      return std::binary_search(touching.begin(), touching.end(), links_of(pair));
-    });
-  }
-
-  /// Adds how fast a point of a link moves along `direction` with each joint. base_T_links are set.
-  void AddMotion(int link, const Eigen::Vector3d& base_p, const Eigen::Vector3d& direction,
-                 Eigen::VectorXd& gradient) const {
-    for (int index = model.links[link].parent_joint; index >= 0;
-         index = model.links[model.joints[index].parent_link].parent_joint) {
-      const kinematics::Joint& joint = model.joints[index];
-      if (joint.type == kinematics::JointType::kFixed) continue;
-      // A joint turns its child link about an axis that stays the same in that link.
-      const geometry::Pose& at = base_T_links[joint.child_link];
-      const Eigen::Vector3d axis = at.rotation * joint.axis;
-      const double speed = joint.type == kinematics::JointType::kPrismatic
-                               ? axis.dot(direction)
-                               : axis.cross(base_p - at.translation).dot(direction);
-      if (joint.mimic) {
-        gradient[joint.mimic->joint] += joint.mimic->multiplier * speed;
-      } else {
-        gradient[index] += speed;
-      }
-    }
-  }
-
-  struct Search {
-    const JointPath& path;
-    double required_m;
-    double smallest_interval;
-    Eigen::VectorXd q;
-    Eigen::VectorXd travel;
+void CollisionChecker::Impl::LeaveOutTouching() {
+  if (options.sampled_allowed_states <= 0) return;
+  Rng rng(20261122);
+  const auto links_of = [&](const Pair& pair) {
+    return std::pair(robot_parts[pair.first].link, robot_parts[pair.second].link);
   };
-
-  Snapshot SnapshotAt(Search& search, double s) const {
-    Snapshot at;
-    at.s = s;
-    search.path.Position(s, search.q);
-    Place(search.q, at);
-    at.distances.assign(pairs.size(), kUnknown);
-    return at;
-  }
-
-  std::optional<Violation> Prove(Search& search, Snapshot& low, Snapshot& high,
-                                 const std::vector<int>& candidates) const {
-    search.travel.setZero();
-    search.path.Travel(low.s, high.s, search.travel);
-    std::vector<int> unproved;
-    double worst = kInfinity;
-    int worst_pair = -1;
-    bool worst_at_low = false;
-    for (const int index : candidates) {
-      const Pair& pair = pairs[index];
-      double needed = 2 * search.required_m;
-      for (const Lever& lever : pair.levers) needed += lever.length * search.travel[lever.joint];
-      if (LowerBound(pair, low) + LowerBound(pair, high) >= needed) continue;
-      if (TightBound(pair, low) + TightBound(pair, high) >= needed) continue;
-      const double at_low = Measured(index, low);
-      if (at_low < search.required_m) return Violation{low.s, Describe(index, low)};
-      const double at_high = Measured(index, high);
-      if (at_low + at_high >= needed && at_high >= search.required_m) continue;
-      unproved.push_back(index);
-      if (std::min(at_low, at_high) < worst) {
-        worst = std::min(at_low, at_high);
-        worst_pair = index;
-        worst_at_low = at_low < at_high;
-      }
+  const double touch_m = options.sampled_touch_distance_m;
+  std::vector<std::pair<int, int>> touching;
+  for (const Pair& pair : model_pairs) touching.push_back(links_of(pair));
+  std::sort(touching.begin(), touching.end());
+  touching.erase(std::unique(touching.begin(), touching.end()), touching.end());
+  for (int state = 0; state < options.sampled_allowed_states && !touching.empty(); ++state) {
+    Place(RandomState(model, rng), scratch);
+    std::vector<std::pair<int, int>> still;
+    for (const Pair& pair : model_pairs) {
+      const std::pair<int, int> links = links_of(pair);
+      if (!std::binary_search(touching.begin(), touching.end(), links)) continue;
+      if (!still.empty() && still.back() == links) continue;
+      if (LowerBound(pair, scratch) > touch_m) continue;
+      if (Measure(pair, scratch, 2 * touch_m).distance_m <= touch_m) still.push_back(links);
     }
-    if (unproved.empty()) return std::nullopt;
-    if (high.s - low.s <= search.smallest_interval) {
-      Snapshot& worst_end = worst_at_low ? low : high;
-      return Violation{worst_end.s, Describe(worst_pair, worst_end)};
-    }
-    Snapshot middle = SnapshotAt(search, 0.5 * (low.s + high.s));
-    if (std::optional<Violation> found = Prove(search, low, middle, unproved)) return found;
-    return Prove(search, middle, high, unproved);
+    std::sort(still.begin(), still.end());
+    touching = std::move(still);
   }
-};
+  std::erase_if(model_pairs, [&](const Pair& pair) {
+    return std::binary_search(touching.begin(), touching.end(), links_of(pair));
+  });
+}
+
+void CollisionChecker::Impl::Place(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                   Snapshot& snapshot) const {
+  kinematics::LinkPoses(model, q, base_T_links);
+  snapshot.placements.resize(robot_parts.size());
+  snapshot.bounds.resize(robot_parts.size());
+  snapshot.capsules.resize(robot_parts.size());
+  for (std::size_t i = 0; i < robot_parts.size(); ++i) {
+    const RobotPart& part = robot_parts[i];
+    snapshot.placements[i] = Placement::From(base_T_links[part.link] * part.link_T_shape);
+    snapshot.bounds[i] = part.body.hull.BoundsAt(snapshot.placements[i]);
+    snapshot.capsules[i] = part.capsule.At(Placement::From(base_T_links[part.link]));
+  }
+}
+
+bool CollisionChecker::Impl::IsAllowed(const Pair& pair,
+                                       const std::vector<AllowedTouch>& allowed) const {
+  if (!pair.scene) return false;
+  const std::string& link = robot_parts[pair.first].name;
+  const std::string& object = scene_parts[pair.second].name;
+  return std::any_of(allowed.begin(), allowed.end(), [&](const AllowedTouch& touch) {
+    return touch.link == link && touch.object == object;
+  });
+}
+
+bool CollisionChecker::Impl::HasPieces(const Pair& pair) const {
+  const Body& second = pair.scene ? scene_parts[pair.second].body : robot_parts[pair.second].body;
+  return robot_parts[pair.first].body.pieces != nullptr || second.pieces != nullptr;
+}
+
+double CollisionChecker::Impl::LowerBound(const Pair& pair, const Snapshot& at) const {
+  const Bounds& other = pair.scene ? scene_parts[pair.second].bounds : at.bounds[pair.second];
+  return Distance(at.bounds[pair.first], other) - Padding(pair);
+}
+
+double CollisionChecker::Impl::TightBound(const Pair& pair, const Snapshot& at) const {
+  const BoundingCapsule& other =
+      pair.scene ? scene_parts[pair.second].capsule : at.capsules[pair.second];
+  Eigen::Vector3d on_first, on_second;
+  const double apart = Distance(at.capsules[pair.first], other, on_first, on_second);
+  return std::max(LowerBound(pair, at), apart - Padding(pair));
+}
+
+Separation CollisionChecker::Impl::MeasureHulls(const Pair& pair, const Snapshot& at) const {
+  const ConvexShape& first = robot_parts[pair.first].body.hull;
+  const Placement& first_at = at.placements[pair.first];
+  Separation found = pair.scene
+                         ? SignedDistance(first, first_at, scene_parts[pair.second].body.hull,
+                                          scene_parts[pair.second].base_at)
+                         : SignedDistance(first, first_at, robot_parts[pair.second].body.hull,
+                                          at.placements[pair.second]);
+  found.distance_m -= Padding(pair);
+  return found;
+}
+
+Separation CollisionChecker::Impl::Measure(const Pair& pair, const Snapshot& at,
+                                           double ignore_beyond_m) const {
+  const Body& second = pair.scene ? scene_parts[pair.second].body : robot_parts[pair.second].body;
+  const Placement& second_at =
+      pair.scene ? scene_parts[pair.second].base_at : at.placements[pair.second];
+  Separation found = Distance(robot_parts[pair.first].body, at.placements[pair.first], second,
+                              second_at, ignore_beyond_m + Padding(pair));
+  found.distance_m -= Padding(pair);
+  return found;
+}
+
+Clearance CollisionChecker::Impl::Describe(int index, const Snapshot& at) const {
+  const Pair& pair = pairs[index];
+  const Separation found = Measure(pair, at);
+  return {robot_parts[pair.first].name, SecondName(pair), found.distance_m, found.p_first,
+          found.p_second};
+}
+
+void CollisionChecker::Impl::AddMotion(int link, const Eigen::Vector3d& base_p,
+                                       const Eigen::Vector3d& direction, double weight,
+                                       Eigen::VectorXd& gradient) const {
+  for (int index = model.links[link].parent_joint; index >= 0;
+       index = model.links[model.joints[index].parent_link].parent_joint) {
+    const kinematics::Joint& joint = model.joints[index];
+    if (joint.type == kinematics::JointType::kFixed) continue;
+    // A joint turns its child link about an axis that stays the same in that link.
+    const geometry::Pose& at = base_T_links[joint.child_link];
+    const Eigen::Vector3d axis = at.rotation * joint.axis;
+    const double speed = joint.type == kinematics::JointType::kPrismatic
+                             ? axis.dot(direction)
+                             : axis.cross(base_p - at.translation).dot(direction);
+    if (joint.mimic) {
+      gradient[joint.mimic->joint] += weight * joint.mimic->multiplier * speed;
+    } else {
+      gradient[index] += weight * speed;
+    }
+  }
+}
 
 CollisionChecker::CollisionChecker(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 CollisionChecker::CollisionChecker(CollisionChecker&&) noexcept = default;
@@ -250,6 +196,7 @@ Result<CollisionChecker> CollisionChecker::Create(const kinematics::RobotModel& 
   Result<std::vector<RobotPart>> parts = MakeRobotParts(model);
   if (!parts.ok()) return parts.error();
   impl->robot_parts = *std::move(parts);
+  impl->model_parts = impl->robot_parts.size();
   Result<std::vector<std::pair<int, int>>> links =
       CheckedLinkPairs(model, impl->robot_parts, options.allowed_pairs);
   if (!links.ok()) return links.error();
@@ -258,30 +205,63 @@ Result<CollisionChecker> CollisionChecker::Create(const kinematics::RobotModel& 
       if (impl->robot_parts[a].link != first) continue;
       for (std::size_t b = 0; b < impl->robot_parts.size(); ++b) {
         if (impl->robot_parts[b].link != second) continue;
-        impl->self_pairs.push_back(
+        impl->model_pairs.push_back(
             {static_cast<int>(a), static_cast<int>(b), false,
              LeversBetween(model, impl->robot_parts[a], &impl->robot_parts[b])});
       }
     }
   }
   impl->LeaveOutTouching();
-  Result<std::vector<ScenePart>> scene_parts = MakeSceneParts(scene);
-  if (!scene_parts.ok()) return scene_parts.error();
-  impl->scene_parts = *std::move(scene_parts);
-  impl->scene = std::move(scene);
-  impl->MakePairs();
-  return CollisionChecker(std::move(impl));
+  CollisionChecker checker(std::move(impl));
+  if (const Status set = checker.SetScene(std::move(scene)); !set.ok()) return set.error();
+  return checker;
 }
 
 const Scene& CollisionChecker::scene() const { return impl_->scene; }
 
 Status CollisionChecker::SetScene(Scene scene) {
+  if (const Status names = CheckNames(impl_->model, scene); !names.ok()) return names;
   Result<std::vector<ScenePart>> parts = MakeSceneParts(scene);
   if (!parts.ok()) return parts.error();
-  impl_->scene_parts = *std::move(parts);
-  impl_->scene = std::move(scene);
-  impl_->MakePairs();
+  Result<std::vector<RobotPart>> held = MakeHeldParts(impl_->model, scene);
+  if (!held.ok()) return held.error();
+  impl_->Take(std::move(scene), *std::move(parts), *std::move(held));
   return {};
+}
+
+Status CollisionChecker::Attach(const std::string& object, const std::string& link,
+                                const Eigen::Ref<const Eigen::VectorXd>& q,
+                                const std::vector<std::string>& touch_links) {
+  Scene scene = impl_->scene;
+  const auto found = std::find_if(scene.objects.begin(), scene.objects.end(),
+                                  [&](const SceneObject& o) { return o.name == object; });
+  if (found == scene.objects.end()) {
+    return NotFound("the scene has no object \"" + object + "\" to take");
+  }
+  const int index = impl_->model.FindLink(link);
+  if (index < 0) {
+    return NotFound("the robot \"" + impl_->model.name + "\" has no link \"" + link +
+                    "\" to hold \"" + object + "\"");
+  }
+  kinematics::LinkPoses(impl_->model, q, impl_->base_T_links);
+  const geometry::Pose link_T_shape =
+      impl_->base_T_links[static_cast<std::size_t>(index)].Inverse() * found->base_T_shape;
+  scene.held.push_back({object, link, link_T_shape, found->shape, touch_links});
+  scene.objects.erase(found);
+  return SetScene(std::move(scene));
+}
+
+Status CollisionChecker::Detach(const std::string& object,
+                                const Eigen::Ref<const Eigen::VectorXd>& q) {
+  Scene scene = impl_->scene;
+  const auto found = std::find_if(scene.held.begin(), scene.held.end(),
+                                  [&](const HeldObject& h) { return h.name == object; });
+  if (found == scene.held.end()) return NotFound("the robot holds no \"" + object + "\"");
+  kinematics::LinkPoses(impl_->model, q, impl_->base_T_links);
+  const auto link = static_cast<std::size_t>(impl_->model.FindLink(found->link));
+  scene.objects.push_back({object, impl_->base_T_links[link] * found->link_T_shape, found->shape});
+  scene.held.erase(found);
+  return SetScene(std::move(scene));
 }
 
 Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
@@ -302,7 +282,7 @@ Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::Vect
     if (bound >= smallest && bound > -impl.Padding(impl.pairs[index])) break;
     std::pop_heap(impl.queue.begin(), impl.queue.end(), std::greater<>());
     impl.queue.pop_back();
-    const double distance = impl.Measure(impl.pairs[index], impl.scratch).distance_m;
+    const double distance = impl.Measure(impl.pairs[index], impl.scratch, smallest).distance_m;
     if (distance < smallest) {
       smallest = distance;
       smallest_pair = index;
@@ -310,6 +290,29 @@ Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::Vect
   }
   if (smallest_pair < 0) return {{}, {}, kInfinity};
   return impl.Describe(smallest_pair, impl.scratch);
+}
+
+double CollisionChecker::NearnessCost(const Eigen::Ref<const Eigen::VectorXd>& q, double margin_m,
+                                      const std::vector<AllowedTouch>& allowed,
+                                      Eigen::VectorXd* gradient) const {
+  const Impl& impl = *impl_;
+  impl.Place(q, impl.scratch);
+  if (gradient != nullptr) gradient->setZero(q.size());
+  double cost = 0;
+  for (const Pair& pair : impl.pairs) {
+    if (impl.TightBound(pair, impl.scratch) >= margin_m || impl.IsAllowed(pair, allowed)) continue;
+    const Separation found = impl.MeasureHulls(pair, impl.scratch);
+    const double lack = margin_m - found.distance_m;
+    if (lack <= 0) continue;
+    cost += lack * lack;
+    if (gradient == nullptr) continue;
+    impl.AddMotion(impl.robot_parts[pair.first].link, found.p_first, found.normal, 2 * lack,
+                   *gradient);
+    if (pair.scene) continue;
+    impl.AddMotion(impl.robot_parts[pair.second].link, found.p_second, found.normal, -2 * lack,
+                   *gradient);
+  }
+  return cost;
 }
 
 double CollisionChecker::CapsuleSelfClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
@@ -327,7 +330,8 @@ double CollisionChecker::CapsuleSelfClearance(const Eigen::Ref<const Eigen::Vect
   double smallest = kInfinity;
   const Pair* nearest = nullptr;
   Eigen::Vector3d on_first, on_second, p_first, p_second;
-  for (const Pair& pair : impl.self_pairs) {
+  for (std::size_t i = 0; i < impl.self_pairs; ++i) {
+    const Pair& pair = impl.pairs[i];
     const BoundingCapsule& first = capsules[pair.first];
     const BoundingCapsule& second = capsules[pair.second];
     // Balls around the capsules decide most pairs.
@@ -345,25 +349,9 @@ double CollisionChecker::CapsuleSelfClearance(const Eigen::Ref<const Eigen::Vect
   gradient->setZero(q.size());
   if (nearest == nullptr || (p_first - p_second).norm() < 1e-12) return smallest;
   const Eigen::Vector3d apart = (p_first - p_second).normalized();
-  impl.AddMotion(impl.robot_parts[nearest->first].link, p_first, apart, *gradient);
-  impl.AddMotion(impl.robot_parts[nearest->second].link, p_second, -apart, *gradient);
+  impl.AddMotion(impl.robot_parts[nearest->first].link, p_first, apart, 1, *gradient);
+  impl.AddMotion(impl.robot_parts[nearest->second].link, p_second, apart, -1, *gradient);
   return smallest;
-}
-
-std::optional<Violation> CollisionChecker::FirstViolation(
-    const JointPath& path, double begin, double end, double required_clearance_m,
-    const std::vector<AllowedTouch>& allowed) const {
-  const Impl& impl = *impl_;
-  std::vector<int> candidates;
-  for (std::size_t i = 0; i < impl.pairs.size(); ++i) {
-    if (!impl.IsAllowed(impl.pairs[i], allowed)) candidates.push_back(static_cast<int>(i));
-  }
-  const auto joints = static_cast<Eigen::Index>(impl.model.joints.size());
-  Impl::Search search{path, required_clearance_m, kSmallestInterval * (end - begin),
-                      Eigen::VectorXd::Zero(joints), Eigen::VectorXd::Zero(joints)};
-  Snapshot low = impl.SnapshotAt(search, begin);
-  Snapshot high = impl.SnapshotAt(search, end);
-  return impl.Prove(search, low, high, candidates);
 }
 
 }  // namespace exemplar::collision

@@ -135,7 +135,7 @@ int Best(std::span<const Eigen::Vector3d> points, Score score) {
 
 }  // namespace
 
-Result<Hull> ConvexHull(std::span<const Eigen::Vector3d> points) {
+Result<Hull> ConvexHull(std::span<const Eigen::Vector3d> points, double tolerance_share) {
   const Error flat = InvalidArgument("the points span no volume");
   if (points.size() < 4) return flat;
   const int a = Best(points, [](const Eigen::Vector3d& p) { return -p.x(); });
@@ -152,10 +152,12 @@ Result<Hull> ConvexHull(std::span<const Eigen::Vector3d> points) {
   const int d =
       Best(points, [&](const Eigen::Vector3d& p) { return std::abs(normal.dot(p - points[a])); });
   if (std::abs(normal.dot(points[d] - points[a])) < 1e-7 * size) return flat;
-  Builder builder(points, 1e-9 * size);
+  Builder builder(points, tolerance_share * size);
   builder.Start({a, b, c, d});
   builder.Grow();
-  return builder.Take();
+  Hull hull = builder.Take();
+  hull.cloud_size = size;
+  return hull;
 }
 
 }  // namespace exemplar::collision

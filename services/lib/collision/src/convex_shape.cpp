@@ -15,7 +15,6 @@
 
 #include "convex_hull.hpp"
 #include "exemplar/base/text.hpp"
-#include "mesh_file.hpp"
 #include "segments.hpp"
 
 namespace exemplar::collision {
@@ -33,6 +32,10 @@ using Core = ConvexShape::Core;
 constexpr double kGjkTolerance_m = 1e-6;
 /// An answer is taken when it is proved to be this near to the true distance.
 constexpr double kCertainty_m = 1e-5;
+/// Hulls of more points than this are made a little too large rather than exact.
+constexpr std::size_t kManyPoints = 10000;
+constexpr double kFineHullShare = 1e-9;
+constexpr double kRoughHullShare = 1e-4;
 
 bool IsPositive(double value) { return std::isfinite(value) && value > 0; }
 
@@ -54,7 +57,7 @@ Separation BetweenCores(const Eigen::Vector3d& p1, double r1, const Eigen::Vecto
                         const Eigen::Vector3d& fallback_normal) {
   const double length = (p2 - p1).norm();
   const Eigen::Vector3d n = length > 1e-12 ? Eigen::Vector3d((p2 - p1) / length) : fallback_normal;
-  return {length - r1 - r2, p1 + r1 * n, p2 - r2 * n};
+  return {length - r1 - r2, p1 + r1 * n, p2 - r2 * n, n};
 }
 
 /// A point against a box or cylinder: signed distance and the surface point, in the solid's frame.
@@ -100,7 +103,7 @@ Separation PointAgainstSolid(const ConvexShape& ball, const Placement& ball_at,
   const double length = n.norm();
   n = length > 1e-12 ? Eigen::Vector3d(n / length) : Eigen::Vector3d(-Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d on_ball = centre + ball.radius() * n;
-  return {distance - ball.radius(), solid_at * on_ball, solid_at * surface};
+  return {distance - ball.radius(), solid_at * on_ball, solid_at * surface, solid_at.rotation * n};
 }
 
 // ---------------------------------------------------------------- by support planes and FCL
@@ -111,7 +114,7 @@ Separation Along(const Eigen::Vector3d& n, const ConvexShape& first, const Place
                  const ConvexShape& second, const Placement& second_at) {
   const Eigen::Vector3d p1 = first_at * first.Support(first_at.rotation.transpose() * n);
   const Eigen::Vector3d p2 = second_at * second.Support(-(second_at.rotation.transpose() * n));
-  return {n.dot(p2 - p1), p1, p2};
+  return {n.dot(p2 - p1), p1, p2, n};
 }
 
 class BestDirection {
@@ -216,7 +219,7 @@ Separation ByGjk(const ConvexShape& first, const Placement& first_at, const Conv
     const double claimed = length - first.radius() - second.radius();
     if (claimed - certain.distance_m < kCertainty_m) {
       return {certain.distance_m, nearest.p_first + first.radius() * n,
-              nearest.p_second - second.radius() * n};
+              nearest.p_second - second.radius() * n, n};
     }
     if (!best || certain.distance_m > best->distance_m) best = certain;
   }
@@ -265,47 +268,61 @@ Result<ConvexShape> ConvexShape::Create(const kinematics::Shape& shape) {
     fcl->core = std::make_shared<fcl::Capsuled>(0.0, capsule->length);
     fcl->whole = std::make_shared<fcl::Capsuled>(capsule->radius, capsule->length);
   } else {
-    const auto& mesh = std::get<kinematics::Mesh>(shape);
-    for (int i = 0; i < 3; ++i) {
-      if (!std::isfinite(mesh.scale[i]) || mesh.scale[i] == 0) {
-        return InvalidArgument(mesh.path + ": mesh scale is " + FormatDouble(mesh.scale[i]) +
-                               ", must not be zero");
-      }
-    }
-    Result<std::vector<Eigen::Vector3d>> corners = ReadStl(mesh.path);
-    if (!corners.ok()) return corners.error();
-    for (Eigen::Vector3d& corner : *corners) corner = corner.cwiseProduct(mesh.scale);
-    Result<Hull> hull = ConvexHull(*corners);
-    if (!hull.ok()) return WithPlace(hull.error(), mesh.path);
-    const auto faces = std::make_shared<std::vector<int>>();
-    for (const std::array<int, 3>& face : hull->faces) {
-      faces->insert(faces->end(), {3, face[0], face[1], face[2]});
-    }
-    const auto vertices =
-        std::make_shared<const std::vector<Eigen::Vector3d>>(std::move(hull->vertices));
-    Eigen::Vector3d lower = vertices->front();
-    Eigen::Vector3d upper = lower;
-    for (const Eigen::Vector3d& vertex : *vertices) {
-      lower = lower.cwiseMin(vertex);
-      upper = upper.cwiseMax(vertex);
-    }
-    out.core_ = Core::kHull;
-    out.vertices_ = vertices;
-    out.centre_ = 0.5 * (lower + upper);
-    out.half_ = 0.5 * (upper - lower);
-    fcl->core =
-        std::make_shared<fcl::Convexd>(vertices, static_cast<int>(hull->faces.size()), faces);
-    fcl->whole = fcl->core;
+    return InvalidArgument("a mesh is not convex by itself");
   }
+  out.Keep(fcl);
+  return out;
+}
+
+Result<ConvexShape> ConvexShape::OfPoints(std::span<const Eigen::Vector3d> points) {
+  const double share = points.size() > kManyPoints ? kRoughHullShare : kFineHullShare;
+  Result<Hull> hull = ConvexHull(points, share);
+  if (!hull.ok()) return hull.error();
+  // Indices of the corners, as FCL takes them: each face begins with their number.
+  const auto counted = std::make_shared<std::vector<int>>();
+  const auto faces = std::make_shared<std::vector<int>>();
+  for (const std::array<int, 3>& face : hull->faces) {
+    counted->insert(counted->end(), {3, face[0], face[1], face[2]});
+    faces->insert(faces->end(), face.begin(), face.end());
+  }
+  const auto vertices =
+      std::make_shared<const std::vector<Eigen::Vector3d>>(std::move(hull->vertices));
+  Eigen::Vector3d lower = vertices->front();
+  Eigen::Vector3d upper = lower;
+  for (const Eigen::Vector3d& vertex : *vertices) {
+    lower = lower.cwiseMin(vertex);
+    upper = upper.cwiseMax(vertex);
+  }
+  ConvexShape out;
+  out.core_ = Core::kHull;
+  out.vertices_ = vertices;
+  out.faces_ = faces;
+  out.centre_ = 0.5 * (lower + upper);
+  out.half_ = 0.5 * (upper - lower);
+  if (share > kFineHullShare) out.radius_ = share * hull->cloud_size;
+  const auto fcl = std::make_shared<Fcl>();
+  fcl->core =
+      std::make_shared<fcl::Convexd>(vertices, static_cast<int>(hull->faces.size()), counted);
+  fcl->whole = fcl->core;
+  out.Keep(fcl);
+  return out;
+}
+
+void ConvexShape::Keep(const std::shared_ptr<Fcl>& fcl) {
   // FCL reads the local bounds in const queries but computes them only when told.
   for (const auto& geometry : {fcl->core, fcl->whole}) {
     std::const_pointer_cast<fcl::CollisionGeometryd>(geometry)->computeLocalAABB();
   }
-  out.fcl_ = fcl;
-  return out;
+  fcl_ = fcl;
 }
 
 Eigen::Vector3d ConvexShape::Support(const Eigen::Vector3d& direction) const {
+  const Eigen::Vector3d point = CoreSupport(direction);
+  const double length = direction.norm();
+  return radius_ > 0 && length > 0 ? point + radius_ / length * direction : point;
+}
+
+Eigen::Vector3d ConvexShape::CoreSupport(const Eigen::Vector3d& direction) const {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   switch (core_) {
     case Core::kPoint:
@@ -334,10 +351,6 @@ Eigen::Vector3d ConvexShape::Support(const Eigen::Vector3d& direction) const {
       break;
     }
   }
-  if (radius_ > 0) {
-    const double length = direction.norm();
-    if (length > 0) point += radius_ / length * direction;
-  }
   return point;
 }
 
@@ -361,7 +374,7 @@ double ConvexShape::reach() const {
   if (core_ == Core::kHull) {
     double farthest = 0;
     for (const Eigen::Vector3d& vertex : *vertices_) farthest = std::max(farthest, vertex.norm());
-    return farthest;
+    return farthest + radius_;
   }
   if (core_ == Core::kCylinder) return std::hypot(half_.x(), half_.z());
   return half_.norm() + radius_;
@@ -389,6 +402,7 @@ Separation SignedDistance(const ConvexShape& first, const Placement& first_at,
   if (second.core() == Core::kPoint && is_solid(first.core())) {
     Separation found = PointAgainstSolid(second, second_at, first, first_at);
     std::swap(found.p_first, found.p_second);
+    found.normal = -found.normal;
     return found;
   }
   return ByGjk(first, first_at, second, second_at);

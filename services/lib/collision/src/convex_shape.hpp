@@ -36,14 +36,18 @@ struct Bounds {
 double Distance(const Bounds& a, const Bounds& b);
 
 /// A core (point, segment, box, cylinder or hull) and a radius around it: a sphere is a point with
-/// a radius, a capsule a segment. Meshes are taken by their convex hull. Immutable, cheap to copy.
+/// a radius, a capsule a segment. Immutable, cheap to copy.
 class ConvexShape {
  public:
-  /// Errors name the size at fault, or the mesh file.
+  /// Errors name the size at fault. Precondition: not a mesh.
   static Result<ConvexShape> Create(const kinematics::Shape& shape);
+  /// The hull of points, or of so many that it, with a radius, contains all.
+  static Result<ConvexShape> OfPoints(std::span<const Eigen::Vector3d> points);
 
   /// The point of the whole body (core and radius) farthest along `direction`, in its own frame.
   Eigen::Vector3d Support(const Eigen::Vector3d& direction) const;
+  /// As Support, of the core alone.
+  Eigen::Vector3d CoreSupport(const Eigen::Vector3d& direction) const;
   Bounds BoundsAt(const Placement& placement) const;
   /// The largest distance of a point of the body from the origin of its frame.
   double reach() const;
@@ -58,11 +62,16 @@ class ConvexShape {
     return vertices_ ? std::span<const Eigen::Vector3d>(*vertices_)
                      : std::span<const Eigen::Vector3d>();
   }
+  /// kHull: three corners (indices into vertices()) a face, counter-clockwise from outside.
+  std::span<const int> faces() const {
+    return faces_ ? std::span<const int>(*faces_) : std::span<const int>();
+  }
   struct Fcl;  ///< the geometries as FCL wants them
   const Fcl& fcl() const { return *fcl_; }
 
  private:
   ConvexShape() = default;
+  void Keep(const std::shared_ptr<Fcl>& fcl);
 
   Core core_ = Core::kPoint;
   double radius_ = 0;
@@ -70,6 +79,7 @@ class ConvexShape {
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   // Shared: FCL's geometries refer to the vertices, and copies of a shape are the same shape.
   std::shared_ptr<const std::vector<Eigen::Vector3d>> vertices_;
+  std::shared_ptr<const std::vector<int>> faces_;
   std::shared_ptr<const Fcl> fcl_;
 };
 
@@ -77,6 +87,7 @@ struct Separation {
   double distance_m = 0;  ///< negative: penetration depth
   Eigen::Vector3d p_first = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_second = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, from first to second
 };
 
 /// Signed distance. Pairs of spheres and capsules, and spheres with boxes and cylinders, by closed

@@ -24,7 +24,22 @@ Scene MakeScene(const scene::Description& description,
     scene.objects.push_back({button.name, base_T_object * object_T_shape,
                              kinematics::Cylinder{button.radius_m, button.height_m}});
   }
+  for (const scene::Cloud& cloud : description.clouds) {
+    scene.clouds.push_back(
+        {cloud.name, cloud.base_T_cloud, cloud.cloud_p_points, cloud.resolution_m});
+  }
+  for (const scene::Held& held : description.held) {
+    scene.held.push_back({held.name, held.link, held.link_T_shape, held.shape, held.touch_links});
+  }
   return scene;
+}
+
+CheckerOptions OptionsOf(const kinematics::RobotDescription& robot) {
+  CheckerOptions options;
+  if (!robot.allowed_pairs) return options;
+  options.allowed_pairs = *robot.allowed_pairs;
+  options.sampled_allowed_states = 0;
+  return options;
 }
 
 }  // namespace exemplar::collision

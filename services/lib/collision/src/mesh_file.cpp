@@ -14,7 +14,9 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 84;
 constexpr std::size_t kTriangleBytes = 50;
-constexpr std::size_t kMaxTriangles = 5'000'000;
+constexpr std::size_t kMaxTriangles = 1'000'000;
+/// A triangle of a text file seldom takes more.
+constexpr std::uintmax_t kMaxBytes = 400 * kMaxTriangles;
 
 std::uint32_t ReadLittleEndian(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -22,6 +24,12 @@ std::uint32_t ReadLittleEndian(std::string_view bytes, std::size_t at) {
     value |= static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[at + i])) << (8 * i);
   }
   return value;
+}
+
+Error TooManyTriangles(std::string_view source, std::size_t triangles) {
+  return InvalidArgument(std::string(source) + ": the mesh has " + std::to_string(triangles) +
+                         " triangles or more; at most " + std::to_string(kMaxTriangles) +
+                         " are taken: simplify it");
 }
 
 double ReadFloat(std::string_view bytes, std::size_t at) {
@@ -73,6 +81,7 @@ Result<std::vector<Eigen::Vector3d>> ParseText(std::string_view text, std::strin
                              std::string(line) + "\" is not a vertex of three numbers");
     }
     corners.push_back(p);
+    if (corners.size() > 3 * kMaxTriangles) return TooManyTriangles(source, kMaxTriangles + 1);
   }
   if (corners.size() % 3 != 0) {
     return InvalidArgument(std::string(source) + ": " + std::to_string(corners.size()) +
@@ -88,7 +97,8 @@ Result<std::vector<Eigen::Vector3d>> ParseStl(std::string_view bytes, std::strin
   // Some writers begin binary files with "solid" too: the length decides first.
   if (bytes.size() >= kHeaderBytes) {
     const std::size_t triangles = ReadLittleEndian(bytes, 80);
-    if (triangles <= kMaxTriangles && bytes.size() == kHeaderBytes + triangles * kTriangleBytes) {
+    if (bytes.size() == kHeaderBytes + triangles * kTriangleBytes) {
+      if (triangles > kMaxTriangles) return TooManyTriangles(source, triangles);
       if (triangles == 0) {
         return InvalidArgument(std::string(source) + ": the mesh has no triangles");
       }
@@ -110,6 +120,16 @@ Result<std::vector<Eigen::Vector3d>> ParseStl(std::string_view bytes, std::strin
 }
 
 Result<std::vector<Eigen::Vector3d>> ReadStl(const std::filesystem::path& file) {
+  std::error_code failed;
+  const std::uintmax_t size = std::filesystem::file_size(file, failed);
+  if (failed) {
+    return NotFound(file.string() + ": the mesh file cannot be opened (" + failed.message() + ")");
+  }
+  if (size > kMaxBytes) {
+    return InvalidArgument(file.string() + ": the mesh file has " + std::to_string(size) +
+                           " bytes; at most " + std::to_string(kMaxBytes) +
+                           " are read: simplify the mesh");
+  }
   std::ifstream in(file, std::ios::binary);
   if (!in) return NotFound(file.string() + ": the mesh file cannot be opened");
   std::ostringstream bytes;

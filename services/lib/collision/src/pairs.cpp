@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "exemplar/base/text.hpp"
 
@@ -59,7 +60,7 @@ void AddLevers(const RobotModel& model, const RobotPart& part, const std::vector
     if (!Moves(joint)) continue;
     double length = 1;
     if (joint.type != JointType::kPrismatic) {
-      length = part.shape.reach();
+      length = part.body.hull.reach();
       int link = part.link;
       Eigen::Vector3d offset = part.link_T_shape.translation;
       while (model.links[link].parent_joint != index) {
@@ -86,14 +87,16 @@ void AddLevers(const RobotModel& model, const RobotPart& part, const std::vector
 Result<std::vector<RobotPart>> MakeRobotParts(const RobotModel& model) {
   std::vector<RobotPart> parts;
   for (std::size_t link = 0; link < model.links.size(); ++link) {
+    const std::string& name = model.links[link].name;
     for (const kinematics::Geometry& geometry : model.links[link].collisions) {
-      Result<ConvexShape> shape = ConvexShape::Create(geometry.shape);
-      if (!shape.ok()) {
-        return WithPlace(shape.error(),
-                         "link \"" + model.links[link].name + "\": collision geometry");
+      Result<Body> body = MakeBody(geometry.shape);
+      if (!body.ok()) {
+        return WithPlace(body.error(), "link \"" + name + "\": collision geometry");
       }
-      const BoundingCapsule capsule = FitCapsule(*shape).At(Placement::From(geometry.link_T_shape));
-      parts.push_back({static_cast<int>(link), geometry.link_T_shape, *std::move(shape), capsule});
+      const BoundingCapsule capsule =
+          FitCapsule(body->hull).At(Placement::From(geometry.link_T_shape));
+      parts.push_back(
+          {name, static_cast<int>(link), geometry.link_T_shape, *std::move(body), capsule});
     }
   }
   return parts;
@@ -101,16 +104,64 @@ Result<std::vector<RobotPart>> MakeRobotParts(const RobotModel& model) {
 
 Result<std::vector<ScenePart>> MakeSceneParts(const Scene& scene) {
   std::vector<ScenePart> parts;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    Result<ConvexShape> shape = ConvexShape::Create(scene.objects[i].shape);
-    if (!shape.ok()) {
-      return WithPlace(shape.error(), "object \"" + scene.objects[i].name + "\"");
-    }
-    const Placement at = Placement::From(scene.objects[i].base_T_shape);
-    parts.push_back(
-        {static_cast<int>(i), at, shape->BoundsAt(at), *shape, FitCapsule(*shape).At(at)});
+  const auto add = [&](const std::string& name, const geometry::Pose& base_T_body,
+                       Result<Body> body) -> Status {
+    if (!body.ok()) return WithPlace(body.error(), "object \"" + name + "\"");
+    const Placement at = Placement::From(base_T_body);
+    const Bounds bounds = body->hull.BoundsAt(at);
+    const BoundingCapsule capsule = FitCapsule(body->hull).At(at);
+    parts.push_back({name, at, bounds, *std::move(body), capsule});
+    return {};
+  };
+  for (const SceneObject& object : scene.objects) {
+    const Status added = add(object.name, object.base_T_shape, MakeBody(object.shape));
+    if (!added.ok()) return added.error();
+  }
+  for (const PointCloud& cloud : scene.clouds) {
+    const Status added = add(cloud.name, cloud.base_T_cloud,
+                             MakeCloudBody(cloud.cloud_p_points, cloud.resolution_m));
+    if (!added.ok()) return added.error();
   }
   return parts;
+}
+
+Result<std::vector<RobotPart>> MakeHeldParts(const RobotModel& model, const Scene& scene) {
+  std::vector<RobotPart> parts;
+  for (const HeldObject& held : scene.held) {
+    const std::string place = "held object \"" + held.name + "\"";
+    std::vector<std::string> links = held.touch_links;
+    links.push_back(held.link);
+    for (const std::string& link : links) {
+      if (model.FindLink(link) >= 0) continue;
+      return NotFound(place + ": the robot \"" + model.name + "\" has no link \"" + link + "\"");
+    }
+    Result<Body> body = MakeBody(held.shape);
+    if (!body.ok()) return WithPlace(body.error(), place);
+    const BoundingCapsule capsule = FitCapsule(body->hull).At(Placement::From(held.link_T_shape));
+    parts.push_back(
+        {held.name, model.FindLink(held.link), held.link_T_shape, *std::move(body), capsule});
+  }
+  return parts;
+}
+
+Status CheckNames(const RobotModel& model, const Scene& scene) {
+  std::set<std::string> names;
+  for (const kinematics::Link& link : model.links) names.insert(link.name);
+  const auto claim = [&](const std::string& name) -> Status {
+    if (names.insert(name).second) return {};
+    return InvalidArgument("object \"" + name +
+                           "\": a link of the robot or another object has this name");
+  };
+  for (const SceneObject& object : scene.objects) {
+    if (const Status free = claim(object.name); !free.ok()) return free;
+  }
+  for (const PointCloud& cloud : scene.clouds) {
+    if (const Status free = claim(cloud.name); !free.ok()) return free;
+  }
+  for (const HeldObject& held : scene.held) {
+    if (const Status free = claim(held.name); !free.ok()) return free;
+  }
+  return {};
 }
 
 Result<std::vector<std::pair<int, int>>> CheckedLinkPairs(
@@ -140,15 +191,16 @@ Result<std::vector<std::pair<int, int>>> CheckedLinkPairs(
       if (ParentWithParts(model, has_parts, a) == b || ParentWithParts(model, has_parts, b) == a) {
         continue;
       }
-      const std::vector<int> between = JointsBetween(model, a, b);
-      if (std::none_of(between.begin(), between.end(),
-                       [&](int joint) { return Moves(model.joints[joint]); })) {
-        continue;
-      }
-      pairs.emplace_back(a, b);
+      if (MoveAgainstEachOther(model, a, b)) pairs.emplace_back(a, b);
     }
   }
   return pairs;
+}
+
+bool MoveAgainstEachOther(const RobotModel& model, int first, int second) {
+  const std::vector<int> between = JointsBetween(model, first, second);
+  return std::any_of(between.begin(), between.end(),
+                     [&](int joint) { return Moves(model.joints[joint]); });
 }
 
 std::vector<Lever> LeversBetween(const RobotModel& model, const RobotPart& first,

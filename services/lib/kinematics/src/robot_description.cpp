@@ -49,14 +49,18 @@ class DescriptionReader {
     if (!servo) return servo.error();
     Result<std::vector<std::string>> touch = ReadTouchLinks(root["touch_links"], *model, *chain);
     if (!touch) return touch.error();
-    return RobotDescription{model->name,       folder_,           std::move(*model),
-                            std::move(*chain), std::move(*touch), std::move(*home),
-                            std::move(*servo)};
+    Result<std::optional<LinkPairs>> allowed = ReadAllowedPairs(root, *model);
+    if (!allowed) return allowed.error();
+    if (Status status = ReadConvexMeshes(root, *model); !status) return status.error();
+    return RobotDescription{
+        model->name,       folder_,          std::move(*model), std::move(*chain),
+        std::move(*touch), std::move(*home), std::move(*servo), std::move(*allowed)};
   }
 
  private:
-  static constexpr std::array<std::string_view, 8> kKeys = {
-      "urdf", "base", "tip", "touch_links", "home", "acceleration", "jerk", "servo"};
+  static constexpr std::array<std::string_view, 10> kKeys = {
+      "urdf",        "srdf", "convex_meshes", "base", "tip",
+      "touch_links", "home", "acceleration",  "jerk", "servo"};
   static constexpr std::array<std::string_view, 2> kServoKeys = {"stiffness", "damping"};
 
   Error At(const YAML::Node& node, const std::string& what) const {
@@ -215,6 +219,31 @@ class DescriptionReader {
         });
     if (!status) return status.error();
     return servo;
+  }
+
+  Result<std::optional<LinkPairs>> ReadAllowedPairs(const YAML::Node& root,
+                                                    const RobotModel& model) const {
+    if (!root["srdf"]) return std::optional<LinkPairs>();
+    Result<std::string> file = ReadText(root, "srdf");
+    if (!file) return file.error();
+    Result<LinkPairs> pairs = ReadSrdf(folder_ / *file, model);
+    if (!pairs) return pairs.error();
+    return std::optional<LinkPairs>(*std::move(pairs));
+  }
+
+  Status ReadConvexMeshes(const YAML::Node& root, RobotModel& model) const {
+    const YAML::Node node = root["convex_meshes"];
+    if (!node) return {};
+    bool convex = false;
+    if (!node.IsScalar() || !YAML::convert<bool>::decode(node, convex)) {
+      return At(node, "convex_meshes must be true or false");
+    }
+    for (Link& link : model.links) {
+      for (Geometry& geometry : link.collisions) {
+        if (auto* mesh = std::get_if<Mesh>(&geometry.shape)) mesh->convex = convex;
+      }
+    }
+    return {};
   }
 
   Result<std::vector<std::string>> ReadTouchLinks(const YAML::Node& list, const RobotModel& model,

@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "points_file.hpp"
 #include "yaml_reader.hpp"
 
 namespace exemplar::scene {
@@ -25,12 +26,12 @@ kinematics::Shape ReadShape(const MapReader& map, const std::filesystem::path& f
   const auto positive = [&](const std::string& key) {
     return map.Number(key, std::nullopt, Range::kPositive);
   };
-  for (const char* key : {"size", "radius", "length", "mesh", "scale"}) {
+  for (const char* key : {"size", "radius", "length", "mesh", "scale", "convex"}) {
     const std::string k = key;
     const bool belongs =
         (kind == "box" && k == "size") || (kind == "sphere" && k == "radius") ||
         ((kind == "cylinder" || kind == "capsule") && (k == "radius" || k == "length")) ||
-        (kind == "mesh" && (k == "mesh" || k == "scale"));
+        (kind == "mesh" && (k == "mesh" || k == "scale" || k == "convex"));
     if (!belongs) refuse(k);
   }
   if (kind == "box") {
@@ -42,10 +43,27 @@ kinematics::Shape ReadShape(const MapReader& map, const std::filesystem::path& f
   if (kind == "mesh") {
     return kinematics::Mesh{
         (folder / map.Text("mesh")).lexically_normal().string(),
-        map.Vector("scale", Eigen::Vector3d(Eigen::Vector3d::Ones()), Range::kPositive)};
+        map.Vector("scale", Eigen::Vector3d(Eigen::Vector3d::Ones()), Range::kPositive),
+        map.Flag("convex", false)};
   }
   map.Complain("shape", '"' + kind + "\" is none of box, sphere, cylinder, capsule, mesh");
   return kinematics::Box{};
+}
+
+Cloud ReadCloud(const MapReader& map, const std::filesystem::path& folder) {
+  Cloud cloud;
+  cloud.name = map.Text("name");
+  cloud.base_T_cloud = ReadPose(map);
+  cloud.resolution_m = map.Number("resolution", cloud.resolution_m, Range::kPositive);
+  const std::string file = map.Text("file");
+  if (file.empty()) return cloud;
+  Result<std::vector<Eigen::Vector3d>> points = ReadPoints(folder / file);
+  if (points.ok()) {
+    cloud.cloud_p_points = *std::move(points);
+  } else {
+    map.Complain("file", points.error().message);
+  }
+  return cloud;
 }
 
 Marker ReadMarker(const MapReader& map) {
@@ -130,7 +148,8 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
   }
   Description description;
   if (document.IsNull()) return description;
-  const MapReader top(findings, document, "", {"obstacles", "buttons", "cameras"});
+  const MapReader top(findings, document, "",
+                      {"obstacles", "clouds", "held", "buttons", "cameras"});
   std::set<std::string> things;
   std::set<std::string> cameras;
   const auto claim = [](std::set<std::string>& names, const MapReader& map,
@@ -138,12 +157,28 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
     if (!names.insert(name).second) map.Complain("name", '"' + name + "\" is taken already");
   };
   top.List("obstacles", [&](const YAML::Node& node, const std::string& path) {
-    const MapReader map(
-        findings, node, path,
-        {"name", "shape", "size", "radius", "length", "mesh", "scale", "position", "quaternion"});
+    const MapReader map(findings, node, path,
+                        {"name", "shape", "size", "radius", "length", "mesh", "scale", "convex",
+                         "position", "quaternion"});
     Obstacle obstacle{map.Text("name"), ReadPose(map), ReadShape(map, folder)};
     claim(things, map, obstacle.name);
     description.obstacles.push_back(std::move(obstacle));
+  });
+  top.List("clouds", [&](const YAML::Node& node, const std::string& path) {
+    const MapReader map(findings, node, path,
+                        {"name", "file", "resolution", "position", "quaternion"});
+    Cloud cloud = ReadCloud(map, folder);
+    claim(things, map, cloud.name);
+    description.clouds.push_back(std::move(cloud));
+  });
+  top.List("held", [&](const YAML::Node& node, const std::string& path) {
+    const MapReader map(findings, node, path,
+                        {"name", "link", "touch", "shape", "size", "radius", "length", "mesh",
+                         "scale", "convex", "position", "quaternion"});
+    Held held{map.Text("name"), map.Text("link"), ReadPose(map), ReadShape(map, folder),
+              map.Texts("touch")};
+    claim(things, map, held.name);
+    description.held.push_back(std::move(held));
   });
   top.List("buttons", [&](const YAML::Node& node, const std::string& path) {
     const MapReader map(findings, node, path,

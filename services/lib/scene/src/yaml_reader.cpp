@@ -115,6 +115,28 @@ double MapReader::Number(const std::string& key, std::optional<double> fallback,
   return *ParseDouble(child.Scalar());
 }
 
+bool MapReader::Flag(const std::string& key, bool fallback) const {
+  if (!Has(key)) return fallback;
+  const YAML::Node child = Child(key);
+  bool flag = fallback;
+  if (!child.IsScalar() || !YAML::convert<bool>::decode(child, flag)) {
+    Complain(key, "must be true or false, not " + KindOf(child));
+  }
+  return flag;
+}
+
+std::vector<std::string> MapReader::Texts(const std::string& key) const {
+  std::vector<std::string> texts;
+  List(key, [&](const YAML::Node& node, const std::string& path) {
+    if (node.IsScalar() && !node.Scalar().empty()) {
+      texts.push_back(node.Scalar());
+    } else {
+      findings_.Add(node.Mark(), path, "must be a text, not " + KindOf(node));
+    }
+  });
+  return texts;
+}
+
 int MapReader::Integer(const std::string& key, std::optional<int> fallback, int lowest,
                        int highest) const {
   if (!Present(key, !fallback.has_value())) return fallback.value_or(lowest);

@@ -44,6 +44,9 @@ class MapReader {
   std::string Text(const std::string& key) const;
   double Number(const std::string& key, std::optional<double> fallback,
                 Range range = Range::kAny) const;
+  bool Flag(const std::string& key, bool fallback) const;
+  /// A list of texts; an absent one is empty.
+  std::vector<std::string> Texts(const std::string& key) const;
   int Integer(const std::string& key, std::optional<int> fallback, int lowest, int highest) const;
   Eigen::Vector3d Vector(const std::string& key, const std::optional<Eigen::Vector3d>& fallback,
                          Range range = Range::kAny) const;

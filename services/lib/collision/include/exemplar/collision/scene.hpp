@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "exemplar/base/result.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
 #include "exemplar/kinematics/robot_model.hpp"
 #include "exemplar/scene/description.hpp"
 
@@ -21,16 +22,39 @@ struct SceneObject {
   kinematics::Shape shape;
 };
 
-struct Scene {
-  std::vector<SceneObject> objects;
+/// What a camera saw of things without a name: every point fills the cell of an octree that it
+/// lies in. Nothing is known, so nothing is in the way, behind what was seen.
+struct PointCloud {
+  std::string name;
+  geometry::Pose base_T_cloud;
+  std::vector<Eigen::Vector3d> cloud_p_points;
+  double resolution_m = 0.02;  ///< edge of the smallest cells
 };
 
-/// The obstacles and the buttons' housings of a description; `objects` replaces the poses of
-/// buttons of the same name (where they are seen now). A button is one body of its own name.
+/// An object that moves with a link of the robot: a tool, or what a hand holds. It is checked
+/// against the scene, and against the robot but for its link and the links named.
+struct HeldObject {
+  std::string name;
+  std::string link;
+  geometry::Pose link_T_shape;
+  kinematics::Shape shape;
+  std::vector<std::string> touch_links = {};
+};
+
+/// Names are unique, and are no names of links.
+struct Scene {
+  std::vector<SceneObject> objects;
+  std::vector<PointCloud> clouds = {};
+  std::vector<HeldObject> held = {};
+};
+
+/// The obstacles, clouds, held objects and the buttons' housings of a description; `objects`
+/// replaces the poses of buttons of the same name (where they are seen now). A button is one body
+/// of its own name.
 Scene MakeScene(const scene::Description& description,
                 const std::vector<geometry::NamedPose>& objects = {});
 
-/// Two bodies and the room between them. Names of links, or of scene objects.
+/// Two bodies and the room between them. Names of links, held objects or scene objects.
 struct Clearance {
   std::string first;
   std::string second;
@@ -41,18 +65,21 @@ struct Clearance {
 
 /// A link may touch an object (the button that is to be pressed).
 struct AllowedTouch {
-  std::string link;
+  std::string link;  ///< or a held object
   std::string object;
 };
 
 struct CheckerOptions {
-  double padding_m = 0.0;  ///< added around every link of the robot
+  double padding_m = 0.0;  ///< added around every link of the robot and what it holds
   std::vector<std::pair<std::string, std::string>> allowed_pairs =
       {};  ///< links never checked, beside adjacent ones
   /// Link pairs that touch in every one of so many random states are left out; 0 turns it off.
   int sampled_allowed_states = 200;
   double sampled_touch_distance_m = 3e-3;  ///< nearer than this counts as touching there
 };
+
+/// With a robot's SRDF: its pairs, and no sampling. Without: by sampling.
+CheckerOptions OptionsOf(const kinematics::RobotDescription& robot);
 
 /// A motion of all joints along a parameter, for proofs.
 class JointPath {
@@ -86,12 +113,26 @@ class CollisionChecker {
   const Scene& scene() const;
   /// Errors name the object and the size at fault; the scene then stays as it was.
   Status SetScene(Scene scene);
+  /// Takes an object of the scene into the hand: from here on it keeps the place at `link` that it
+  /// has at `q`. Errors name the object or link that there is not.
+  Status Attach(const std::string& object, const std::string& link,
+                const Eigen::Ref<const Eigen::VectorXd>& q,
+                const std::vector<std::string>& touch_links = {});
+  /// Leaves a held object where it is at `q`.
+  Status Detach(const std::string& object, const Eigen::Ref<const Eigen::VectorXd>& q);
 
   /// The smallest clearance at `q` (by joint index of the model, as kinematics::LinkPoses), self
   /// and scene, pairs of `allowed` left out. Nothing to check: distance is infinite and the names
   /// are empty.
   Clearance SmallestClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
                               const std::vector<AllowedTouch>& allowed = {}) const;
+
+  /// What nearness costs: the sum over all pairs of bodies of the square of what their distance
+  /// lacks to `margin_m`; 0 where everything is farther apart. Bodies count by their convex shapes.
+  /// `gradient` (by joint index of the model, as q), where wanted.
+  double NearnessCost(const Eigen::Ref<const Eigen::VectorXd>& q, double margin_m,
+                      const std::vector<AllowedTouch>& allowed = {},
+                      Eigen::VectorXd* gradient = nullptr) const;
 
   /// The smallest distance of the robot to itself by capsules around its geometry: never more than
   /// the true one, and much quicker. `gradient` (by joint index of the model, as q), where wanted:
@@ -103,14 +144,16 @@ class CollisionChecker {
   /// Proves that the clearance is at least `required_clearance_m` all along [begin, end], by the
   /// clearance at a few places and how far any point of a link can move from there (conservative
   /// bisection), or returns the first place where it is not. Nothing between the places can be
-  /// missed, however thin. Where bisection down to 1e-4 of the interval proves nothing the motion
-  /// counts as violating.
+  /// missed, however thin. Where nothing is proved though no body moves by more than 0.1 mm between
+  /// two places the motion counts as violating: so it does only within 0.1 mm of the clearance
+  /// asked for.
   std::optional<Violation> FirstViolation(const JointPath& path, double begin, double end,
                                           double required_clearance_m,
                                           const std::vector<AllowedTouch>& allowed = {}) const;
 
+  struct Impl;  ///< opaque
+
  private:
-  struct Impl;
   explicit CollisionChecker(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

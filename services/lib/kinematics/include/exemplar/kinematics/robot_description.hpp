@@ -3,6 +3,10 @@
 // cannot.
 //
 //   urdf: arm7.urdf
+//   srdf: arm7.srdf       # optional: its disabled pairs of links are never checked for collision;
+//                         # without it, pairs that touch in every one of many random states
+//   convex_meshes: true   # optional: collision meshes are taken by their convex hulls, which fills
+//                         # their hollows and lets open ones pass
 //   base: base            # link in whose frame all poses are
 //   tip: tool             # the frame that skills move
 //   touch_links: [finger] # links that may touch what a skill is about
@@ -14,12 +18,14 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "exemplar/base/result.hpp"
 #include "exemplar/kinematics/chain.hpp"
 #include "exemplar/kinematics/robot_model.hpp"
+#include "exemplar/kinematics/srdf.hpp"
 
 namespace exemplar::kinematics {
 
@@ -37,6 +43,7 @@ struct RobotDescription {
       touch_links;                ///< empty in the file: the tip link's nearest link with geometry
   Eigen::VectorXd home;           ///< n = chain.dof()
   std::vector<ServoGains> servo;  ///< one a chain joint
+  std::optional<LinkPairs> allowed_pairs = {};  ///< of the SRDF, where there is one
 };
 
 /// Errors name file, line and key.

@@ -32,6 +32,7 @@ struct Capsule {  ///< axis along z; `length` without the caps. URDF has no caps
 struct Mesh {
   std::string path;  ///< resolved file
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+  bool convex = false;  ///< taken by its convex hull, which fills hollows and closes open meshes
 };
 using Shape = std::variant<Box, Sphere, Cylinder, Capsule, Mesh>;
 

@@ -5,6 +5,12 @@
 //   obstacles:
 //     - {name: table, shape: box, size: [1.2, 0.8, 0.04], position: [0.7, 0, -0.02], quaternion:
 //     [0, 0, 0, 1]}
+//     - {name: bin, shape: mesh, mesh: bin.stl, position: [0.4, 0.3, 0]}  # convex: true: its hull
+//   clouds:                       # points, one a line (x y z), that a camera saw
+//     - {name: shelf, file: shelf.xyz, resolution: 0.02, position: [0, 0, 0]}
+//   held:                         # moves with a link, in whose frame its pose is
+//     - {name: peg, link: hand, shape: cylinder, radius: 0.01, length: 0.1, position: [0, 0, 0.1],
+//        touch: [finger]}         # links of the robot that it may touch beside its own
 //   buttons:
 //     - name: target            # its frame's origin is where hand and button meet unless `contact`
 //     says otherwise
@@ -38,6 +44,21 @@ struct Obstacle {
   std::string name;
   geometry::Pose base_T_shape;
   kinematics::Shape shape;
+};
+
+struct Cloud {
+  std::string name;
+  geometry::Pose base_T_cloud;
+  std::vector<Eigen::Vector3d> cloud_p_points;
+  double resolution_m = 0.02;
+};
+
+struct Held {
+  std::string name;
+  std::string link;
+  geometry::Pose link_T_shape;
+  kinematics::Shape shape;
+  std::vector<std::string> touch_links;
 };
 
 /// A square ArUco marker (dictionary 4x4, 50 ids) fixed to an object; z out of the printed face.
@@ -77,6 +98,8 @@ struct Description {
   std::vector<Obstacle> obstacles;
   std::vector<Button> buttons;
   std::vector<StereoCamera> cameras;
+  std::vector<Cloud> clouds = {};
+  std::vector<Held> held = {};
 };
 
 /// Errors name file, line and key; unknown keys are errors with the nearest known one.
