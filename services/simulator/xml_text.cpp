@@ -3,35 +3,9 @@
 #include <cassert>
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/base/xml.hpp"
 
 namespace exemplar::simulator {
-namespace {
-
-std::string Escaped(std::string_view text) {
-  std::string out;
-  out.reserve(text.size());
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
-}  // namespace
 
 Attribute::Attribute(std::string_view attribute_name, double number)
     : name(attribute_name), value(FormatDouble(number)) {}
@@ -58,7 +32,7 @@ void XmlText::Start(std::string_view element, const Attributes& attributes, std:
   text_ += '<';
   text_ += element;
   for (const Attribute& attribute : attributes) {
-    text_ += ' ' + attribute.name + "=\"" + Escaped(attribute.value) + '"';
+    text_ += ' ' + attribute.name + "=\"" + EscapeXml(attribute.value) + '"';
   }
   text_ += end;
 }

@@ -1,6 +1,7 @@
 #include "exemplar/figures/figures.hpp"
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/base/xml.hpp"
 #include "exemplar/figures/svg.hpp"
 
 namespace exemplar::figures {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/base/xml.hpp"
 
 namespace exemplar::figures {
 namespace {
@@ -57,30 +58,6 @@ std::string_view NameOf(Anchor anchor) {
 }
 
 }  // namespace
-
-std::string EscapeXml(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        // XML knows no other control characters.
-        out += static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t' ? ' ' : c;
-    }
-  }
-  return out;
-}
 
 void Svg::Line(Point from, Point to, const Stroke& stroke) {
   body_ += "<line" + Attribute("x1", from.x) + Attribute("y1", from.y) + Attribute("x2", to.x) +

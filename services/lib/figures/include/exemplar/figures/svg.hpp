@@ -33,9 +33,6 @@ enum class Anchor { kStart, kMiddle, kEnd };
 
 enum class Symbol { kDisc, kRing, kTriangle, kSquare, kCross };
 
-/// `text` with the characters that XML gives a meaning replaced.
-std::string EscapeXml(std::string_view text);
-
 /// A document that grows element by element. Thread-compatible.
 class Svg {
  public:
