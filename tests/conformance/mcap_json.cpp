@@ -156,7 +156,7 @@ Result<std::string> Print(const std::vector<Record>& records) {
 
 template <class Number>
 Number ParseNumber(const ordered_json& json) {
-  const std::string text = json.get<std::string>();
+  const std::string text = json.is_number() ? json.dump() : json.get<std::string>();
   Number value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) {

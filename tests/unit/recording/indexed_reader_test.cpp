@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 
 #include "sample_recording.hpp"
 
@@ -122,6 +123,33 @@ TEST(IndexedReader, SurvivesNoiseEverywhere) {
       EXPECT_LE(messages, 2 * sample.messages.size());
     }
   }
+}
+
+TEST(IndexedReader, OrdersTimesWithoutASign) {
+  MemorySink sink;
+  auto writer = Writer::Create(sink, {.chunk_bytes = 40});  // a chunk a message
+  ASSERT_TRUE(writer.ok());
+  ASSERT_TRUE((*writer)->AddChannel({65535, 0, "t", "cdr", {}}).ok());
+  const std::vector<std::int64_t> times = {5, -1, std::numeric_limits<std::int64_t>::min(), 7};
+  for (const std::int64_t time : times) {
+    const Stamp stamp = Stamp::FromNanoseconds(time);
+    ASSERT_TRUE((*writer)->Write({65535, 0, stamp, stamp, Bytes(20)}).ok());
+  }
+  ASSERT_TRUE((*writer)->Close().ok());
+  MemorySource source(sink.bytes());
+  auto reader = IndexedReader::Open(source);
+  ASSERT_TRUE(reader.ok());
+  EXPECT_EQ((*reader)->statistics()->message_start_time.nanoseconds(), 5);
+  EXPECT_EQ((*reader)->statistics()->message_end_time.nanoseconds(), -1);
+  std::vector<std::int64_t> read;
+  ASSERT_TRUE((*reader)
+                  ->ReadMessages({},
+                                 [&](const Message& message) {
+                                   read.push_back(message.log_time.nanoseconds());
+                                   return true;
+                                 })
+                  .ok());
+  EXPECT_EQ(read, (std::vector<std::int64_t>{5, 7, times[2], -1}));
 }
 
 }  // namespace

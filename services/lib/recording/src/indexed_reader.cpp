@@ -9,6 +9,8 @@ namespace {
 /// Bytes that a writer of a later version may have put behind DataEnd's fields.
 constexpr std::uint64_t kLargestPadding = 64;
 
+std::uint64_t Unsigned(Stamp time) { return static_cast<std::uint64_t>(time.nanoseconds()); }
+
 struct MessagePlace {
   Stamp log_time;
   std::uint64_t offset = 0;  ///< within the chunk
@@ -23,7 +25,7 @@ struct OpenChunk {
   std::size_t next = 0;
 
   auto Key() const {
-    return std::make_tuple(messages[next].log_time, file_offset, messages[next].offset);
+    return std::make_tuple(Unsigned(messages[next].log_time), file_offset, messages[next].offset);
   }
 };
 
@@ -115,16 +117,17 @@ class McapIndexedReader final : public IndexedReader {
       if (MayMatch(index, query)) waiting.push_back(&index);
     }
     std::sort(waiting.begin(), waiting.end(), [](const ChunkIndex* a, const ChunkIndex* b) {
-      return std::tie(a->message_start_time, a->chunk_start_offset) <
-             std::tie(b->message_start_time, b->chunk_start_offset);
+      return std::pair(Unsigned(a->message_start_time), a->chunk_start_offset) <
+             std::pair(Unsigned(b->message_start_time), b->chunk_start_offset);
     });
     const auto later = [](const std::unique_ptr<OpenChunk>& a,
                           const std::unique_ptr<OpenChunk>& b) { return a->Key() > b->Key(); };
     std::vector<std::unique_ptr<OpenChunk>> open;  // a heap, the earliest message in front
     std::size_t opened = 0;
     while (opened < waiting.size() || !open.empty()) {
-      if (opened < waiting.size() && (open.empty() || waiting[opened]->message_start_time <=
-                                                          std::get<0>(open.front()->Key()))) {
+      if (opened < waiting.size() &&
+          (open.empty() ||
+           Unsigned(waiting[opened]->message_start_time) <= std::get<0>(open.front()->Key()))) {
         Result<std::unique_ptr<OpenChunk>> chunk = OpenForMessages(*waiting[opened++], query);
         if (!chunk.ok()) return chunk.error();
         if ((*chunk)->messages.empty()) continue;
@@ -237,8 +240,8 @@ class McapIndexedReader final : public IndexedReader {
   }
 
   bool MayMatch(const ChunkIndex& index, const MessageQuery& query) const {
-    if (query.start && index.message_end_time < *query.start) return false;
-    if (query.end && index.message_start_time >= *query.end) return false;
+    if (query.start && Earlier(index.message_end_time, *query.start)) return false;
+    if (query.end && !Earlier(index.message_start_time, *query.end)) return false;
     if (query.topics.empty() || index.message_index_offsets.empty()) return true;
     return std::any_of(index.message_index_offsets.begin(), index.message_index_offsets.end(),
                        [&](const auto& entry) {
@@ -265,15 +268,16 @@ class McapIndexedReader final : public IndexedReader {
       const std::optional<MessageFields> fields = DecodeMessageFields(item->content);
       if (!fields)
         return DamagedAt(index.chunk_start_offset, "a message is shorter than its fields");
-      if (query.start && fields->log_time < *query.start) continue;
-      if (query.end && fields->log_time >= *query.end) continue;
+      if (query.start && Earlier(fields->log_time, *query.start)) continue;
+      if (query.end && !Earlier(fields->log_time, *query.end)) continue;
       if (!Wanted(fields->channel_id, query)) continue;
       chunk->messages.push_back({fields->log_time, item->offset, item->content});
     }
     if (cursor.cut()) return DamagedAt(index.chunk_start_offset, "the chunk ends within a record");
-    std::stable_sort(
-        chunk->messages.begin(), chunk->messages.end(),
-        [](const MessagePlace& a, const MessagePlace& b) { return a.log_time < b.log_time; });
+    std::stable_sort(chunk->messages.begin(), chunk->messages.end(),
+                     [](const MessagePlace& a, const MessagePlace& b) {
+                       return Earlier(a.log_time, b.log_time);
+                     });
     return chunk;
   }
 

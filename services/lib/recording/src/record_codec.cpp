@@ -7,6 +7,10 @@
 namespace exemplar::recording {
 namespace {
 
+void PutLittleEndian(std::uint64_t value, std::size_t bytes, std::uint8_t* out) {
+  for (std::size_t i = 0; i < bytes; ++i) out[i] = static_cast<std::uint8_t>(value >> (8 * i));
+}
+
 /// Appends one record; its length is put in at the end.
 class Encoder {
  public:
@@ -57,13 +61,13 @@ class Encoder {
 
  private:
   Encoder& Number(std::uint64_t v, int bytes) {
-    for (int i = 0; i < bytes; ++i) out_.push_back(static_cast<std::uint8_t>(v >> (8 * i)));
+    const std::size_t at = out_.size();
+    out_.resize(at + static_cast<std::size_t>(bytes));
+    PutLittleEndian(v, static_cast<std::size_t>(bytes), out_.data() + at);
     return *this;
   }
-  void PutLength(int bytes, std::size_t at, std::uint64_t v) {
-    for (int i = 0; i < bytes; ++i) {
-      out_[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(v >> (8 * i));
-    }
+  void PutLength(std::size_t bytes, std::size_t at, std::uint64_t v) {
+    PutLittleEndian(v, bytes, out_.data() + at);
   }
 
   Bytes& out_;
@@ -228,12 +232,18 @@ void Encode(const Channel& channel, Bytes& out) {
 }
 
 void Encode(const MessageView& message, Bytes& out) {
-  Encoder(Opcode::kMessage, out)
-      .U16(message.channel_id)
-      .U32(message.sequence)
-      .Time(message.log_time)
-      .Time(message.publish_time)
-      .Raw(message.data);
+  // The record that there are most of: in one piece.
+  constexpr std::size_t kFields = 2 + 4 + 8 + 8;
+  std::uint8_t head[kRecordPrefix + kFields];
+  head[0] = static_cast<std::uint8_t>(Opcode::kMessage);
+  PutLittleEndian(kFields + message.data.size(), 8, head + 1);
+  std::uint8_t* fields = head + kRecordPrefix;
+  PutLittleEndian(message.channel_id, 2, fields);
+  PutLittleEndian(message.sequence, 4, fields + 2);
+  PutLittleEndian(static_cast<std::uint64_t>(message.log_time.nanoseconds()), 8, fields + 6);
+  PutLittleEndian(static_cast<std::uint64_t>(message.publish_time.nanoseconds()), 8, fields + 14);
+  out.insert(out.end(), std::begin(head), std::end(head));
+  out.insert(out.end(), message.data.begin(), message.data.end());
 }
 
 void EncodeChunkPrefix(const Chunk& chunk, std::uint64_t compressed_size, Bytes& out) {

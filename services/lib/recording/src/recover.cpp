@@ -131,7 +131,8 @@ class Recovery {
 
 }  // namespace
 
-Result<RecoveryReport> Recover(ByteSource& damaged, ByteSink& sink, WriterOptions options) {
+Result<RecoveryReport> Recover(ByteSource& damaged, ByteSink& sink, WriterOptions options,
+                               std::unique_ptr<ByteScratch> scratch) {
   if (const Status magic = CheckMagic(damaged); !magic.ok()) return magic.error();
   const Result<std::optional<RawRecord>> first =
       ReadRawRecord(damaged, sizeof kMagic, ReaderOptions().largest_record_bytes);
@@ -140,7 +141,8 @@ Result<RecoveryReport> Recover(ByteSource& damaged, ByteSink& sink, WriterOption
     const Result<std::optional<Record>> header = Decode((*first)->opcode, (*first)->content);
     if (header.ok()) options.profile = std::get<Header>(**header).profile;
   }
-  Result<std::unique_ptr<Writer>> writer = Writer::Create(sink, std::move(options));
+  Result<std::unique_ptr<Writer>> writer =
+      Writer::Create(sink, std::move(options), std::move(scratch));
   if (!writer.ok()) return writer.error();
   return Recovery(damaged, **writer).Run();
 }

@@ -76,26 +76,33 @@ class McapWriter final : public Writer {
                              "channel.id");
     }
     ++statistics_.channel_count;
+    if (by_channel_.size() <= channel.id) by_channel_.resize(std::size_t{channel.id} + 1);
+    by_channel_[channel.id].known = true;
     return PutInData([&](Bytes& out) { Encode(channel, out); });
   }
 
   Status Write(const MessageView& message) override {
     if (const Status ready = CheckReady(); !ready.ok()) return ready;
-    if (!channels_.contains(message.channel_id)) {
+    if (message.channel_id >= by_channel_.size() || !by_channel_[message.channel_id].known) {
       return InvalidArgument(
           "message: channel " + std::to_string(message.channel_id) + " was not added",
           "message.channel_id");
     }
-    CountMessage(message);
+    OfChannel& of_channel = by_channel_[message.channel_id];
+    CountMessage(message, of_channel);
     if (!options_.chunks) return PutInData([&](Bytes& out) { Encode(message, out); });
     const std::uint64_t offset = chunk_records_.size();
     Encode(message, chunk_records_);
     if (options_.message_indexes) {
-      chunk_message_indexes_[message.channel_id].entries.push_back({message.log_time, offset});
+      if (of_channel.index == nullptr) {
+        of_channel.index = &chunk_message_indexes_[message.channel_id];
+      }
+      of_channel.index->entries.push_back({message.log_time, offset});
     }
-    const auto [first, last] = chunk_message_count_ == 0
-                                   ? std::pair(message.log_time, message.log_time)
-                                   : std::minmax({chunk_start_, chunk_end_, message.log_time});
+    const auto [first, last] =
+        chunk_message_count_ == 0
+            ? std::pair(message.log_time, message.log_time)
+            : std::minmax({chunk_start_, chunk_end_, message.log_time}, Earlier);
     chunk_start_ = first;
     chunk_end_ = last;
     ++chunk_message_count_;
@@ -187,13 +194,25 @@ class McapWriter final : public Writer {
     return Put(scratch_);
   }
 
-  void CountMessage(const MessageView& message) {
+  /// What is looked up for each message. The pointers lead into maps that never lose an entry.
+  struct OfChannel {
+    bool known = false;
+    std::uint64_t* count = nullptr;
+    MessageIndex* index = nullptr;
+  };
+
+  void CountMessage(const MessageView& message, OfChannel& of_channel) {
     const bool first = statistics_.message_count++ == 0;
     statistics_.message_start_time =
-        first ? message.log_time : std::min(statistics_.message_start_time, message.log_time);
+        first ? message.log_time
+              : std::min(statistics_.message_start_time, message.log_time, Earlier);
     statistics_.message_end_time =
-        first ? message.log_time : std::max(statistics_.message_end_time, message.log_time);
-    ++statistics_.channel_message_counts[message.channel_id];
+        first ? message.log_time
+              : std::max(statistics_.message_end_time, message.log_time, Earlier);
+    if (of_channel.count == nullptr) {
+      of_channel.count = &statistics_.channel_message_counts[message.channel_id];
+    }
+    ++*of_channel.count;
   }
 
   Status EndChunk() {
@@ -289,9 +308,9 @@ class McapWriter final : public Writer {
         {Opcode::kChannel, [&] { return all(options_.repeated_channels, channels_, second); }},
         {Opcode::kStatistics,
          [&] { return all(options_.statistics, std::span(&statistics_, 1), itself); }},
-        {Opcode::kChunkIndex, [&] { return PutChunkIndexes(put); }},
+        {Opcode::kMetadataIndex, [&] { return all(true, metadata_indexes_, itself); }},
         {Opcode::kAttachmentIndex, [&] { return all(true, attachment_indexes_, itself); }},
-        {Opcode::kMetadataIndex, [&] { return all(true, metadata_indexes_, itself); }}};
+        {Opcode::kChunkIndex, [&] { return PutChunkIndexes(put); }}};
     for (const auto& [opcode, write] : sections) {
       if (const Status written = group(opcode, write); !written.ok()) return written;
     }
@@ -336,7 +355,8 @@ class McapWriter final : public Writer {
   Statistics statistics_;
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, Channel> channels_;
-  Bytes chunk_index_records_;  ///< behind those in the scratch
+  std::vector<OfChannel> by_channel_;  ///< by id
+  Bytes chunk_index_records_;          ///< behind those in the scratch
   std::unique_ptr<ByteScratch> index_scratch_;
   std::vector<AttachmentIndex> attachment_indexes_;
   std::vector<MetadataIndex> metadata_indexes_;

@@ -35,6 +35,11 @@ inline constexpr std::uint8_t kMagic[8] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', 
 
 using StringMap = std::map<std::string, std::string>;
 
+/// The order of times in the format, which counts nanoseconds without a sign.
+constexpr bool Earlier(Stamp a, Stamp b) {
+  return static_cast<std::uint64_t>(a.nanoseconds()) < static_cast<std::uint64_t>(b.nanoseconds());
+}
+
 struct Header {
   std::string profile;
   std::string library;

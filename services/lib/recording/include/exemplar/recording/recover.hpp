@@ -18,7 +18,9 @@ struct RecoveryReport {
 
 /// Copies every whole record: all of whole chunks, and of a chunk that the end cuts the records
 /// that are whole (with compression: as far as its blocks are). Fails only if `damaged` does not
-/// begin as an MCAP file does, and where the sink or the source fails.
-Result<RecoveryReport> Recover(ByteSource& damaged, ByteSink& sink, WriterOptions options = {});
+/// begin as an MCAP file does, and where the sink or the source fails. `scratch`: as Writer takes
+/// it.
+Result<RecoveryReport> Recover(ByteSource& damaged, ByteSink& sink, WriterOptions options = {},
+                               std::unique_ptr<ByteScratch> scratch = nullptr);
 
 }  // namespace exemplar::recording
