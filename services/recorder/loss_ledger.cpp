@@ -7,6 +7,8 @@ namespace exemplar::recorder {
 namespace {
 
 constexpr Duration kRateWindow = std::chrono::seconds(1);
+/// Programs announce each second.
+constexpr Duration kSilence = std::chrono::seconds(2);
 
 /// The part of a writer's identity that all endpoints of one program share.
 std::string ParticipantOf(const std::string& writer) { return writer.substr(0, writer.find('|')); }
@@ -19,17 +21,16 @@ std::uint64_t Since(std::uint64_t now, std::uint64_t before) {
 
 std::vector<WriterFigures> Difference(const std::vector<WriterFigures>& now,
                                       const std::vector<WriterFigures>& before) {
+  std::map<std::pair<std::string_view, std::string_view>, const WriterFigures*> known;
+  for (const WriterFigures& writer : before) known[{writer.topic, writer.writer}] = &writer;
   std::vector<WriterFigures> difference;
   for (const WriterFigures& writer : now) {
     WriterFigures figures = writer;
-    const auto old = std::find_if(before.begin(), before.end(), [&](const WriterFigures& w) {
-      return w.topic == writer.topic && w.writer == writer.writer;
-    });
-    if (old != before.end()) {
-      figures.received = Since(writer.received, old->received);
-      figures.lost_in_gaps = Since(writer.lost_in_gaps, old->lost_in_gaps);
-      figures.lost_at_end = Since(writer.lost_at_end, old->lost_at_end);
-      figures.dropped = Since(writer.dropped, old->dropped);
+    if (const auto old = known.find({writer.topic, writer.writer}); old != known.end()) {
+      figures.received = Since(writer.received, old->second->received);
+      figures.lost_in_gaps = Since(writer.lost_in_gaps, old->second->lost_in_gaps);
+      figures.lost_at_end = Since(writer.lost_at_end, old->second->lost_at_end);
+      figures.dropped = Since(writer.dropped, old->second->dropped);
       if (figures.received == 0 && figures.lost() == 0) continue;
     }
     difference.push_back(std::move(figures));
@@ -37,37 +38,47 @@ std::vector<WriterFigures> Difference(const std::vector<WriterFigures>& now,
   return difference;
 }
 
-void LossLedger::AddTopic(const ircp::RawTopic& topic) {
-  TopicEntry& entry = topics_[topic.topic];
+LossLedger::TopicEntry& LossLedger::EntryOf(const std::string& topic) {
+  TopicEntry& entry = topics_[topic];
+  if (entry.topic == nullptr) {
+    ircp::RawTopic unknown;
+    unknown.topic = topic;
+    entry.topic = std::make_shared<const ircp::RawTopic>(std::move(unknown));
+  }
+  return entry;
+}
+
+LossLedger::WriterEntry& LossLedger::EntryOf(const std::string& topic, const std::string& writer) {
+  WriterEntry*& known = by_writer_[writer];
+  if (known != nullptr && known->topic->topic->topic == topic) return *known;
+  TopicEntry& of_topic = EntryOf(topic);
+  known = &of_topic.writers[writer];
+  known->topic = &of_topic;
+  return *known;
+}
+
+void LossLedger::AddTopic(ircp::RawTopic topic) {
+  TopicEntry& entry = EntryOf(topic.topic);
   // A writer without schema does not take away what another one brought.
-  if (!entry.topic.schema.empty() && topic.schema.empty()) return;
-  entry.topic = topic;
-  entry.header = ReadHeaderLayout(topic.schema, topic.type);
+  if (!entry.topic->schema.empty() && topic.schema.empty()) return;
+  entry.header = ircp::ReadHeaderLayout(topic.schema, topic.type);
+  entry.topic = std::make_shared<const ircp::RawTopic>(std::move(topic));
 }
 
-std::optional<HeaderLayout> LossLedger::HeaderOf(const std::string& topic) const {
-  const auto found = topics_.find(topic);
-  return found == topics_.end() ? std::nullopt : found->second.header;
-}
-
-const ircp::RawTopic* LossLedger::FindTopic(const std::string& topic) const {
-  const auto found = topics_.find(topic);
-  return found == topics_.end() ? nullptr : &found->second.topic;
-}
-
-void LossLedger::AddReceived(const ircp::RawSample& sample,
-                             const std::optional<SampleHeader>& header, Duration steady_now) {
-  TopicEntry& topic = topics_[sample.topic];
-  if (topic.topic.topic.empty()) topic.topic.topic = sample.topic;
-  WriterEntry& writer = topic.writers[sample.writer];
-  if (header && sample.valid) {
-    writer.source = header->source;
-    writer.sequences.Insert(header->seq);
-  } else if (!topic.header) {
+LossLedger::Known LossLedger::AddReceived(const ircp::RawSample& sample, Duration steady_now) {
+  WriterEntry& writer = EntryOf(sample.topic, sample.writer);
+  TopicEntry& topic = *writer.topic;
+  writer.heard = steady_now;
+  if (!topic.header) {
     writer.sequences.Insert(sample.sequence);
     if (!sample.valid) ++writer.ended_instances;
+  } else if (sample.valid) {
+    if (auto header = ircp::ReadSampleHeader(sample.cdr, *topic.header)) {
+      writer.source = std::move(header->source);
+      writer.sequences.Insert(header->seq);
+    }
   }
-  if (!sample.valid) return;
+  if (!sample.valid) return {topic.topic, writer.source};
   const Duration elapsed = steady_now - topic.window_start;
   if (elapsed >= kRateWindow) {
     topic.rate_hz =
@@ -76,14 +87,24 @@ void LossLedger::AddReceived(const ircp::RawSample& sample,
     topic.in_window = 0;
   }
   ++topic.in_window;
+  return {topic.topic, writer.source};
 }
 
 void LossLedger::AddDropped(const std::string& topic, const std::string& writer) {
-  ++topics_[topic].writers[writer].dropped;
+  ++EntryOf(topic, writer).dropped;
 }
 
-void LossLedger::AddAnnounced(const std::string& status_writer, const ircp::TopicCount& count) {
-  announced_[{count.topic, ParticipantOf(status_writer), count.source}] = count.sent;
+void LossLedger::AddAnnounced(const std::string& status_writer, const ircp::TopicCount& count,
+                              Duration steady_now) {
+  announced_[{count.topic, ParticipantOf(status_writer), count.source}] = {count.sent, steady_now};
+}
+
+const LossLedger::Announcement* LossLedger::AnnouncedOf(const std::string& topic,
+                                                        const std::string& writer,
+                                                        const WriterEntry& entry) const {
+  if (entry.source.empty()) return nullptr;
+  const auto found = announced_.find({topic, ParticipantOf(writer), entry.source});
+  return found == announced_.end() ? nullptr : &found->second;
 }
 
 WriterFigures LossLedger::FiguresOf(const std::string& topic, const std::string& writer,
@@ -96,10 +117,9 @@ WriterFigures LossLedger::FiguresOf(const std::string& topic, const std::string&
   figures.lost_in_gaps = entry.sequences.lost();
   figures.dropped = entry.dropped;
   figures.last = entry.sequences.highest();
-  const auto announced = announced_.find({topic, ParticipantOf(writer), entry.source});
-  if (announced != announced_.end() && !entry.source.empty()) {
-    figures.announced = announced->second;
-    figures.lost_at_end = Since(announced->second, figures.last);
+  if (const Announcement* announced = AnnouncedOf(topic, writer, entry)) {
+    figures.announced = announced->sent;
+    figures.lost_at_end = Since(announced->sent, figures.last);
   }
   return figures;
 }
@@ -112,10 +132,12 @@ std::vector<WriterFigures> LossLedger::writers() const {
   return all;
 }
 
-bool LossLedger::HasAllAnnounced() const {
+bool LossLedger::HasAllAnnounced(Duration steady_now) const {
   for (const auto& [name, topic] : topics_) {
     for (const auto& [id, writer] : topic.writers) {
-      if (FiguresOf(name, id, writer).lost_at_end > 0) return false;
+      const Announcement* const announced = AnnouncedOf(name, id, writer);
+      if (announced == nullptr || announced->sent <= writer.sequences.highest()) continue;
+      if (steady_now - std::max(announced->at, writer.heard) < kSilence) return false;
     }
   }
   return true;
@@ -126,8 +148,8 @@ std::vector<api::TopicFigures> LossLedger::TopicFigures(Duration steady_now) con
   for (const auto& [name, topic] : topics_) {
     api::TopicFigures figures;
     figures.topic = name;
-    figures.type = topic.topic.type;
-    figures.has_schema = !topic.topic.schema.empty();
+    figures.type = topic.topic->type;
+    figures.has_schema = !topic.topic->schema.empty();
     for (const auto& [id, writer] : topic.writers) {
       const WriterFigures w = FiguresOf(name, id, writer);
       figures.received += w.received;

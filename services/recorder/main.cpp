@@ -1,15 +1,13 @@
 // exemplar-recorder: a station's topics into MCAP files, told over gRPC and DDS.
 
-#include <atomic>
-
 #include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/participant.hpp"
-#include "exemplar/ircp/control.hpp"
+#include "exemplar/ircp/clock_watch.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
 #include "exemplar/rpc/server.hpp"
-#include "recorder/control_commands.hpp"
+#include "recorder/control_link.hpp"
 #include "recorder/metrics.hpp"
 #include "recorder/program_options.hpp"
 #include "recorder/recorder.hpp"
@@ -17,11 +15,9 @@
 int main(int argc, char** argv) {
   using namespace exemplar;
   constexpr const char* kName = "exemplar-recorder";
-  bool all_topics = false;
   program::Options options(kName, "Records a station's topics into MCAP files",
                            "exemplar-recorder --station lab --data-dir /var/lib/exemplar",
                            {.bus = true, .server = true, .data = true});
-  options.Add("--all-topics", all_topics, "record every topic, not only those under ircp/");
   recorder::ProgramOptions words;
   words.AddTo(options);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
@@ -33,39 +29,38 @@ int main(int argc, char** argv) {
   auto participant = bus::Participant::Create({.domain = common.domain,
                                                .station = common.station,
                                                .name = kName,
+                                               .interfaces = common.interfaces,
+                                               .peers = common.peers,
+                                               .discovery_servers = common.discovery_servers,
+                                               .best_effort_topics = common.best_effort,
                                                .clock = &clock,
                                                .log = log.get()});
   if (!participant) return program::Fail(kName, participant.error());
 
-  std::unique_ptr<ircp::ControlServer> control;
-  std::atomic<ircp::ControlServer*> told = nullptr;
+  const auto clocks = ircp::ClockWatch::Create(**participant, clock, *log, "recorder");
+  if (!clocks) return program::Fail(kName, clocks.error());
+  std::unique_ptr<recorder::Recorder> recorder;
+  // Ends before the recorder that it commands; shared, so that the recorder can see that it has.
+  const auto control = std::make_shared<recorder::ControlLink>();
   recorder::RecorderOptions settings;
   settings.data_dir = common.data_dir;
   settings.station = common.station;
   if (const Status read = words.Apply(settings); !read) return program::Fail(kName, read.error());
-  if (all_topics) settings.wanted = [](const ircp::RawTopic&) { return true; };
-  settings.on_change = [&told](const std::string& state, const std::string& detail) {
-    if (ircp::ControlServer* const server = told) server->SetState(state, detail);
+  settings.clocks = [&clocks] { return (*clocks)->relations(); };
+  settings.on_change = [link = std::weak_ptr(control)](const std::string& state,
+                                                       const std::string& detail) {
+    if (const auto told = link.lock()) told->Tell(state, detail);
   };
-  auto recorder = recorder::Recorder::Create(**participant, clock, *log,
-                                             bus::Decode<ircp::StatusSample>, std::move(settings));
-  if (!recorder) return program::Fail(kName, recorder.error());
-  api::RecorderApi& api = **recorder;
+  auto made = recorder::Recorder::Create(**participant, clock, *log,
+                                         bus::Decode<ircp::StatusSample>, std::move(settings));
+  if (!made) return program::Fail(kName, made.error());
+  recorder = std::move(*made);
+  api::RecorderApi& api = *recorder;
 
-  auto server_of_commands = ircp::ControlServer::Create(
-      **participant, clock, "recorder",
-      [&api](const ircp::CommandSample& command) { return recorder::AnswerCommand(api, command); });
-  if (!server_of_commands) return program::Fail(kName, server_of_commands.error());
-  control = std::move(*server_of_commands);
-  control->SetValues([&api] { return recorder::StatusValues(*api.GetStatus()); });
-  control->SetOnRival([&log](const std::string& writer) {
-    log->Warning("another recorder runs in this station: both obey the same commands",
-                 {{"writer", writer}, {"advice", "end one of them, or give it its own --station"}});
+  const Status linked = control->Open(**participant, clock, *log, api, [&clocks] {
+    return std::map<std::string, std::string>{{"clock_jumps", std::to_string((*clocks)->jumps())}};
   });
-  const api::RecorderStatus status = *api.GetStatus();
-  control->SetState(status.state, status.detail);
-  told = control.get();
-
+  if (!linked) return program::Fail(kName, linked.error());
   rpc::CallLog calls(*log);
   auto server = rpc::Server::Create(
       {.listen = common.listen,
@@ -77,13 +72,14 @@ int main(int argc, char** argv) {
   for (Metric& metric : rpc::MetricsOf(calls, "exemplar_recorder")) {
     figures.push_back(std::move(metric));
   }
+  figures.push_back(CounterOf("exemplar_recorder_clock_jumps_total",
+                              "Clocks of the station's programs that jumped",
+                              [&clocks] { return (*clocks)->jumps(); }));
   const auto metrics = program::ServeMetrics(common, std::move(figures));
   if (!metrics) return program::Fail(kName, metrics.error());
   log->Info("ready", {{"address", (*server)->address()}, {"data_dir", common.data_dir}});
   signals.Wait();
   (*server)->Shutdown(std::chrono::seconds(1));
-  (*recorder)->Close();
-  told = nullptr;
-  control.reset();
+  recorder->Close();
   return 0;
 }

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@ namespace exemplar::recorder {
 /// A sample on its way to the file.
 struct Arrival {
   ircp::RawSample sample;
+  std::shared_ptr<const ircp::RawTopic> topic;  ///< shared with the ledger
   std::string source;
 };
 

@@ -8,10 +8,13 @@
 namespace exemplar::recorder {
 
 void ProgramOptions::AddTo(program::Options& options) {
-  options.Add("--split-mb", split_mb_, "a new file after so many megabytes; 0: never")
+  options.Add("--all-topics", all_topics_, "record every topic, not only those under ircp/")
+      .Add("--split-mb", split_mb_, "a new file after so many megabytes; 0: never")
       .MinMax(0, 1e9)
       .Add("--split-s", split_s_, "a new file after so many seconds; 0: never")
       .MinMax(0, 1e6)
+      .Add("--flush-ms", flush_ms_, "what was received is on the disk after so many milliseconds")
+      .MinMax(2, 1e4)
       .Add("--pre-buffer-s", pre_buffer_s_, "seconds that an event keeps from before it")
       .MinMax(0, 3600)
       .Add("--pre-buffer-mb", pre_buffer_mb_, "megabytes that they may take")
@@ -23,11 +26,13 @@ void ProgramOptions::AddTo(program::Options& options) {
 Status ProgramOptions::Apply(RecorderOptions& settings) const {
   constexpr double kMega = 1e6;
   settings.split_bytes = static_cast<std::uint64_t>(split_mb_ * kMega);
+  settings.flush_interval = FromSeconds(1e-3 * flush_ms_);
   settings.split_length = FromSeconds(split_s_);
   settings.pre_buffer = FromSeconds(pre_buffer_s_);
   settings.pre_buffer_bytes = static_cast<std::size_t>(pre_buffer_mb_ * kMega);
   settings.queue_bytes = std::max(settings.queue_bytes, 2 * settings.pre_buffer_bytes);
   settings.expected_topics = expected_;
+  if (all_topics_) settings.wanted = [](const ircp::RawTopic&) { return true; };
   if (schema_dir_.empty()) return {};
   auto schemas = ReadSchemaFolder(schema_dir_);
   if (!schemas.ok()) return schemas.error();

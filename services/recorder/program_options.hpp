@@ -15,8 +15,10 @@ class ProgramOptions {
   Status Apply(RecorderOptions& settings) const;
 
  private:
+  bool all_topics_ = false;
   double split_mb_ = 0;
   double split_s_ = 0;
+  double flush_ms_ = 100;
   double pre_buffer_s_ = 10;
   double pre_buffer_mb_ = 32;
   std::vector<std::string> expected_;

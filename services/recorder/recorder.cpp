@@ -1,33 +1,39 @@
 #include "recorder/recorder.hpp"
 
 #include <algorithm>
-#include <condition_variable>
-#include <deque>
+#include <map>
 #include <mutex>
 #include <thread>
+#include <utility>
 
-#include "recorder/byte_window.hpp"
+#include "recorder/clock_marks.hpp"
 #include "recorder/folder.hpp"
-#include "recorder/loss_ledger.hpp"
+#include "recorder/intake.hpp"
 #include "recorder/part_files.hpp"
-#include "recorder/pre_buffer.hpp"
 #include "recorder/state.hpp"
 
 namespace exemplar::recorder {
 namespace {
 
 constexpr Duration kPoll = std::chrono::milliseconds(10);
-constexpr Duration kLossInterval = std::chrono::seconds(1);
+/// Losses go into the file at the latest after so long: at once where they begin, seldom where they
+/// go on, so that they do not make the file long.
+constexpr Duration kFirstLossInterval = std::chrono::seconds(1);
+constexpr Duration kLongestLossInterval = std::chrono::seconds(10);
 
 class RecorderImpl final : public Recorder {
  public:
   RecorderImpl(const Clock& clock, Log& log, StatusDecoder decode_status, RecorderOptions options)
       : clock_(clock),
         log_(log),
-        decode_status_(std::move(decode_status)),
         options_(std::move(options)),
-        pre_buffer_(options_.pre_buffer,
-                    std::min(options_.pre_buffer_bytes, options_.queue_bytes / 2)) {}
+        intake_(clock, log,
+                {.queue_bytes = options_.queue_bytes,
+                 .pre_buffer = options_.pre_buffer,
+                 .pre_buffer_bytes = options_.pre_buffer_bytes,
+                 .schema_of = options_.schema_of,
+                 .decode_status = std::move(decode_status)}),
+        clock_marks_(options_.clocks, [this] { return intake_.clock_jumps().correction; }) {}
 
   ~RecorderImpl() override {
     Close();
@@ -37,8 +43,8 @@ class RecorderImpl final : public Recorder {
   Status Open(ircp::RawBus& bus) {
     ircp::RawTapOptions tap;
     tap.wanted = options_.wanted;
-    tap.on_topic = [this](const ircp::RawTopic& topic) { OnTopic(topic); };
-    tap.on_sample = [this](ircp::RawSample&& sample) { OnSample(std::move(sample)); };
+    tap.on_topic = [this](const ircp::RawTopic& topic) { intake_.AddTopic(topic); };
+    tap.on_sample = [this](ircp::RawSample&& sample) { intake_.Add(std::move(sample)); };
     Result<std::unique_ptr<ircp::RawTap>> made = bus.MakeTap(std::move(tap));
     if (!made.ok()) return made.error();
     tap_ = std::move(*made);
@@ -48,7 +54,7 @@ class RecorderImpl final : public Recorder {
       detail_ = "waits for writers of " + Join(options_.expected_topics, ", ");
     }
     OpenIfMatched();
-    writer_thread_ = std::jthread([this](std::stop_token stop) { WriteLoop(std::move(stop)); });
+    writer_thread_ = std::jthread([this](const std::stop_token& stop) { WriteLoop(stop); });
     return {};
   }
 
@@ -70,10 +76,7 @@ class RecorderImpl final : public Recorder {
       api::RecordStart start;
       start.name = event.name;
       start.metadata = event.metadata;
-      {
-        const std::lock_guard lock(mutex_);
-        before = pre_buffer_.length(clock_.Steady());
-      }
+      before = intake_.buffered();
       if (const Status begun = Begin(start, true); !begun.ok()) return begun.error();
     }
     const Status marked =
@@ -103,11 +106,9 @@ class RecorderImpl final : public Recorder {
     info.station = options_.station;
     info.started = now;
     info.metadata = request.metadata;
-    Result<std::unique_ptr<PartFiles>> file = PartFiles::Create(
-        options_.data_dir, std::move(info), limits, options_.file, clock_, [this] {
-          const std::lock_guard lock(mutex_);
-          return Difference(ledger_.writers(), at_start_);
-        });
+    Result<std::unique_ptr<PartFiles>> file =
+        PartFiles::Create(options_.data_dir, std::move(info), limits, options_.file, clock_,
+                          [this] { return intake_.losses(); });
     if (!file.ok()) return file.error();
     const std::string path = (*file)->path().string();
     {
@@ -115,33 +116,24 @@ class RecorderImpl final : public Recorder {
       file_ = std::move(*file);
       last_flush_ = clock_.Steady();
       last_losses_ = last_flush_;
-      losses_written_ = 0;
+      loss_interval_ = kFirstLossInterval;
+      losses_written_.clear();
+      jumps_written_ = 0;
+      clock_marks_.Reset();
     }
     {
       const std::lock_guard lock(mutex_);
-      const Duration steady = clock_.Steady();
-      const auto figures = [this] { return ledger_.writers(); };
-      if (with_past) {
-        PreBuffer::Content past = pre_buffer_.Take(steady, figures);
-        at_start_ = std::move(past.figures);
-        queue_ = std::move(past.arrivals);
-        queue_bytes_ = past.bytes;
-      } else {
-        pre_buffer_.Clear();
-        at_start_ = figures();
-      }
       state_ = State::kRecording;
       detail_ = "recording " + name;
       path_ = path;
       failure_.reset();
       recorded_before_ = Duration(0);
-      recording_since_ = steady;
+      recording_since_ = clock_.Steady();
       messages_ = 0;
       bytes_ = 0;
       part_ = limits.any() ? 1 : 0;
       pauses_ = 0;
-      left_out_ = 0;
-      arrived_.notify_one();
+      intake_.Begin(with_past);
     }
     log_.Info("recording", {{"file", path}});
     return {};
@@ -167,17 +159,21 @@ class RecorderImpl final : public Recorder {
     Settle();
     std::vector<WriterFigures> losses;
     {
-      std::unique_lock lock(mutex_);
+      const std::lock_guard lock(mutex_);
       if (failure_) return *failure_;
       SetStateLocked(State::kStopped, "closing");
-      drained_.wait(lock, [&] { return queue_.empty() && !writing_; });
-      losses = Difference(ledger_.writers(), at_start_);
+      losses = intake_.End();
     }
+    intake_.WaitUntilDrained();
     Status finished;
     {
       const std::lock_guard lock_file(file_mutex_);
       if (file_ != nullptr) {
-        finished = file_->Finish(losses, PauseFigures());
+        finished = NoteClockJumps();
+        if (finished.ok()) {
+          finished = clock_marks_.Write(*file_);
+        }
+        if (finished.ok()) finished = file_->Finish(losses, PauseFigures());
         const std::lock_guard lock(mutex_);
         NoteFileLocked();
       }
@@ -230,112 +226,37 @@ class RecorderImpl final : public Recorder {
     return lost;
   }
 
-  // ---- on threads of the network
-
-  void OnTopic(ircp::RawTopic topic) {
-    if (topic.schema.empty()) topic.schema = options_.schema_of(topic.type);
-    {
-      const std::lock_guard lock(mutex_);
-      ledger_.AddTopic(topic);
-    }
-    if (topic.schema.empty()) {
-      log_.Warning("topic without schema: its bytes are recorded as they are",
-                   {{"topic", topic.topic}, {"type", topic.type}});
-    }
-  }
-
-  void OnSample(ircp::RawSample&& sample) {
-    std::optional<HeaderLayout> layout;
-    bool is_status = false;
-    {
-      const std::lock_guard lock(mutex_);
-      layout = ledger_.HeaderOf(sample.topic);
-      const ircp::RawTopic* topic = ledger_.FindTopic(sample.topic);
-      is_status = topic != nullptr && topic->type == "exemplar::ircp::v1::Status";
-    }
-    std::optional<SampleHeader> header;
-    if (layout && sample.valid) header = ReadSampleHeader(sample.cdr, *layout);
-    std::vector<ircp::TopicCount> announced;
-    if (is_status && sample.valid) {
-      Result<ircp::StatusSample> status = decode_status_(sample.cdr);
-      if (status.ok()) announced = std::move(status->sent);
-    }
-    const std::lock_guard lock(mutex_);
-    const Duration now = clock_.Steady();
-    const bool has_file = HasFileLocked();
-    if (!has_file) pre_buffer_.Prepare(now, [this] { return ledger_.writers(); });
-    ledger_.AddReceived(sample, header, now);
-    for (const ircp::TopicCount& count : announced) ledger_.AddAnnounced(sample.writer, count);
-    window_.Add(sample.cdr.size(), now);
-    if (!sample.valid) return;
-    if (!has_file) {
-      pre_buffer_.Add({std::move(sample), header ? std::move(header->source) : std::string()}, now);
-      return;
-    }
-    if (state_ == State::kPaused) {
-      ++left_out_;
-      return;
-    }
-    if (queue_bytes_ + sample.cdr.size() > options_.queue_bytes) {
-      ledger_.AddDropped(sample.topic, sample.writer);
-      return;
-    }
-    queue_bytes_ += sample.cdr.size();
-    queue_.push_back({std::move(sample), header ? std::move(header->source) : std::string()});
-    arrived_.notify_one();
-  }
-
   // ---- on the writer's thread
 
-  void WriteLoop(std::stop_token stop) {
+  void WriteLoop(const std::stop_token& stop) {
+    std::vector<Arrival> batch;
     while (true) {
-      std::deque<Arrival> batch;
-      {
-        std::unique_lock lock(mutex_);
-        arrived_.wait_for(lock, stop, options_.flush_interval / 2, [&] { return !queue_.empty(); });
-        if (stop.stop_requested() && queue_.empty()) return;
-        batch.swap(queue_);
-        writing_ = true;
-      }
+      intake_.Take(batch, options_.flush_interval / 2, stop);
+      if (stop.stop_requested() && batch.empty()) return;
       OpenIfMatched();
-      const std::size_t written_bytes = WriteBatch(batch);
-      {
-        const std::lock_guard lock(mutex_);
-        queue_bytes_ -= written_bytes;
-        writing_ = false;
-      }
-      drained_.notify_all();
+      intake_.Done(batch, WriteBatch(batch));
     }
   }
 
-  std::size_t WriteBatch(const std::deque<Arrival>& batch) {
-    std::size_t bytes = 0;
-    for (const Arrival& arrival : batch) bytes += arrival.sample.cdr.size();
+  /// How many were written.
+  std::size_t WriteBatch(const std::vector<Arrival>& batch) {
     const std::lock_guard lock_file(file_mutex_);
-    if (file_ == nullptr) {
-      const std::lock_guard lock(mutex_);
-      for (const Arrival& lost : batch) ledger_.AddDropped(lost.sample.topic, lost.sample.writer);
-      return bytes;
-    }
-    for (auto arrival = batch.begin(); arrival != batch.end(); ++arrival) {
-      const Status written =
-          file_->Write(TopicOf(arrival->sample), arrival->source, arrival->sample);
+    if (file_ == nullptr) return 0;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const Arrival& arrival = batch[i];
+      const Status written = file_->Write(*arrival.topic, arrival.source, arrival.sample);
       if (written.ok()) continue;
-      {
-        const std::lock_guard lock(mutex_);
-        for (auto lost = arrival; lost != batch.end(); ++lost) {
-          ledger_.AddDropped(lost->sample.topic, lost->sample.writer);
-        }
-      }
       Fail(written.error());
-      return bytes;
+      return i;
     }
-    if (const Status kept = KeepPromises(); !kept.ok()) Fail(kept.error());
+    Status kept = NoteClockJumps();
+    if (kept.ok()) kept = KeepPromises();
+    if (!kept.ok()) Fail(kept.error());
     if (file_ != nullptr) {
       const std::lock_guard lock(mutex_);
       NoteFileLocked();
     }
-    return bytes;
+    return batch.size();
   }
 
   /// Precondition: both the file's lock and the inner one are held, and there is a file.
@@ -346,35 +267,41 @@ class RecorderImpl final : public Recorder {
     path_ = file_->path().string();
   }
 
-  ircp::RawTopic TopicOf(const ircp::RawSample& sample) {
-    const std::lock_guard lock(mutex_);
-    const ircp::RawTopic* topic = ledger_.FindTopic(sample.topic);
-    if (topic != nullptr) return *topic;
-    ircp::RawTopic unknown;
-    unknown.topic = sample.topic;
-    return unknown;
+  /// Precondition: file_mutex_ is held, and there is a file.
+  Status NoteClockJumps() {
+    const Intake::ClockJumps jumps = intake_.clock_jumps();
+    if (jumps.count == jumps_written_) return {};
+    jumps_written_ = jumps.count;
+    log_.Warning("the clock was set: log times keep their old base",
+                 {{"seconds", ToSeconds(-jumps.correction)}});
+    return file_->WriteMark("exemplar.clock_jump", {{"at", ToIso8601(clock_.Now())},
+                                                    {"jumps", std::to_string(jumps.count)},
+                                                    {"added_to_log_times_s",
+                                                     FormatFixed(ToSeconds(jumps.correction), 9)}});
+  }
+
+  /// Of writers that have lost more than the file says. Precondition: file_mutex_ is held.
+  std::vector<WriterFigures> NewLosses() {
+    std::vector<WriterFigures> losses = intake_.losses();
+    std::erase_if(losses, [this](const WriterFigures& writer) {
+      std::uint64_t& written = losses_written_[{writer.topic, writer.writer}];
+      return std::exchange(written, writer.lost()) == writer.lost();
+    });
+    return losses;
   }
 
   /// Syncs, and notes new losses, when it is time. Precondition: file_mutex_ is held.
   Status KeepPromises() {
     const Duration now = clock_.Steady();
-    // Half of it, as a sample may have waited for the other half.
-    if (now - last_flush_ < options_.flush_interval / 2) return {};
+    // A sample has waited for half of the interval at the most, and the next look is as far away.
+    if (now - last_flush_ < options_.flush_interval / 4) return {};
     last_flush_ = now;
-    if (now - last_losses_ >= kLossInterval) {
+    if (now - last_losses_ >= loss_interval_) {
       last_losses_ = now;
-      std::vector<WriterFigures> losses;
-      {
-        const std::lock_guard lock(mutex_);
-        losses = Difference(ledger_.writers(), at_start_);
-      }
-      std::erase_if(losses, [](const WriterFigures& writer) { return writer.lost() == 0; });
-      const std::uint64_t lost = TotalLost(losses);
-      if (lost != losses_written_) {
-        losses_written_ = lost;
-        if (const Status s = file_->WriteLosses(losses); !s.ok()) return s;
-      }
+      loss_interval_ = std::min(2 * loss_interval_, kLongestLossInterval);
+      if (const Status s = file_->WriteLosses(NewLosses()); !s.ok()) return s;
     }
+    if (const Status s = clock_marks_.WriteIfDue(*file_, now); !s.ok()) return s;
     return file_->Flush();
   }
 
@@ -385,6 +312,7 @@ class RecorderImpl final : public Recorder {
     {
       const std::lock_guard lock(mutex_);
       failure_ = error;
+      intake_.End();
       SetStateLocked(State::kStopped, "stopped by a failure: " + error.message +
                                           "; what was written before is whole");
     }
@@ -423,8 +351,7 @@ class RecorderImpl final : public Recorder {
     const Duration deadline = clock_.Steady() + options_.settle_time;
     do {
       clock_.SleepFor(kPoll);
-      const std::lock_guard lock(mutex_);
-      if (ledger_.HasAllAnnounced()) return;
+      if (intake_.HasAllAnnounced()) return;
     } while (clock_.Steady() < deadline);
   }
 
@@ -433,17 +360,18 @@ class RecorderImpl final : public Recorder {
     const std::lock_guard control(control_mutex_);
     bool changed = false;
     {
-      std::unique_lock lock(mutex_);
+      const std::lock_guard lock(mutex_);
       const Result<State> next = Next(state_, event);
       if (!next.ok()) return next.error();
       changed = *next != state_;
-      if (changed) SetStateLocked(*next, detail);
-      if (changed && event == Event::kPause) {
-        ++pauses_;
-        drained_.wait(lock, [&] { return queue_.empty() && !writing_; });
+      if (changed) {
+        SetStateLocked(*next, detail);
+        intake_.SetPaused(event == Event::kPause);
+        if (event == Event::kPause) ++pauses_;
       }
     }
     if (changed) {
+      if (event == Event::kPause) intake_.WaitUntilDrained();
       recording::StringMap fields = PauseFigures();
       fields["at"] = ToIso8601(clock_.Now());
       if (const Status s = WriteMark(mark, std::move(fields)); !s.ok()) return s.error();
@@ -453,7 +381,7 @@ class RecorderImpl final : public Recorder {
 
   recording::StringMap PauseFigures() {
     const std::lock_guard lock(mutex_);
-    return {{"pauses", std::to_string(pauses_)}, {"left_out", std::to_string(left_out_)}};
+    return {{"pauses", std::to_string(pauses_)}, {"left_out", std::to_string(intake_.left_out())}};
   }
 
   /// A record about what happened; a failing disk ends the recording.
@@ -523,16 +451,8 @@ class RecorderImpl final : public Recorder {
     status.duration_s = ToSeconds(recorded);
     status.messages = messages_;
     status.bytes = bytes_;
-    status.topics = ledger_.TopicFigures(now);
-    for (const api::TopicFigures& topic : status.topics) {
-      status.lost += topic.lost;
-      status.rate_hz += topic.rate_hz;
-    }
-    status.bytes_per_s = window_.PerSecond(now);
     status.part = part_;
     status.pauses = pauses_;
-    status.left_out = left_out_;
-    if (!HasFileLocked()) status.buffered_s = ToSeconds(pre_buffer_.length(now));
     return status;
   }
 
@@ -543,6 +463,7 @@ class RecorderImpl final : public Recorder {
       const std::lock_guard lock(mutex_);
       status = StatusLocked();
     }
+    intake_.Describe(status);
     for (api::TopicFigures& topic : status.topics) {
       topic.writers = tap_->matched_writers(topic.topic);
     }
@@ -561,11 +482,11 @@ class RecorderImpl final : public Recorder {
 
   const Clock& clock_;
   Log& log_;
-  StatusDecoder decode_status_;
-  RecorderOptions options_;
+  const RecorderOptions options_;
+  Intake intake_;
   std::unique_ptr<ircp::RawTap> tap_;
 
-  // Taken in this order: control, file, then the inner one.
+  // Taken in this order: control, file, then the inner one; the intake's own comes last.
   std::mutex control_mutex_;  ///< one command at a time
   std::mutex file_mutex_;     ///< the file and its bookkeeping
   std::mutex mutex_;          ///< everything below it
@@ -573,7 +494,10 @@ class RecorderImpl final : public Recorder {
   std::unique_ptr<PartFiles> file_;
   Duration last_flush_{0};
   Duration last_losses_{0};
-  std::uint64_t losses_written_ = 0;
+  Duration loss_interval_{0};
+  std::map<std::pair<std::string, std::string>, std::uint64_t> losses_written_;
+  int jumps_written_ = 0;
+  ClockMarks clock_marks_;
 
   State state_ = State::kClosed;
   bool opening_ = false;  ///< on the network, but not ready: waits for its writers
@@ -584,19 +508,8 @@ class RecorderImpl final : public Recorder {
   std::uint64_t bytes_ = 0;
   int part_ = 0;
   int pauses_ = 0;
-  std::uint64_t left_out_ = 0;
-  PreBuffer pre_buffer_;
-  ByteWindow window_;
   Duration recorded_before_{0};  ///< of this recording, before the last pause
   Duration recording_since_{0};
-  LossLedger ledger_;
-  std::vector<WriterFigures> at_start_;
-  std::deque<Arrival> queue_;
-  std::size_t queue_bytes_ = 0;
-  bool writing_ = false;
-  std::condition_variable_any arrived_;
-  std::condition_variable drained_;
-
   std::jthread writer_thread_;
 };
 

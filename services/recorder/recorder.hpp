@@ -9,6 +9,7 @@
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/clock_relation.hpp"
 #include "exemplar/recording/writer.hpp"
 
 namespace exemplar::recorder {
@@ -40,6 +41,10 @@ struct RecorderOptions {
   /// Stop() waits this long at the most for what writers have announced but is still on its way.
   Duration settle_time = std::chrono::milliseconds(500);
   recording::WriterOptions file = {};
+  /// How the programs' clocks stand to ours, for the files.
+  std::function<std::vector<ircp::ClockRelation>()> clocks = [] {
+    return std::vector<ircp::ClockRelation>();
+  };
   /// Told of each change of state; may ask the recorder for its status and nothing else.
   std::function<void(const std::string& state, const std::string& detail)> on_change =
       [](const std::string&, const std::string&) {};

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "exemplar/base/text.hpp"
+
 namespace exemplar::recorder {
 namespace {
 
@@ -65,9 +67,9 @@ Result<std::uint16_t> RecordingFile::SchemaOf(const ircp::RawTopic& topic) {
 Result<std::uint16_t> RecordingFile::ChannelOf(const ircp::RawTopic& topic,
                                                const std::string& source,
                                                const ircp::RawSample& sample) {
-  std::map<std::string, std::uint16_t>& of_topic = channels_[sample.topic];
-  if (const auto known = of_topic.find(sample.writer); known != of_topic.end()) {
-    return known->second;
+  std::vector<ChannelOfTopic>& of_writer = channels_[sample.writer];
+  for (const ChannelOfTopic& channel : of_writer) {
+    if (channel.topic == sample.topic) return channel.id;
   }
   if (next_channel_ == kLastId) {
     return Error{ErrorCode::kResourceExhausted, "more than 65535 writers in one file"};
@@ -75,10 +77,17 @@ Result<std::uint16_t> RecordingFile::ChannelOf(const ircp::RawTopic& topic,
   Result<std::uint16_t> schema = SchemaOf(topic);
   if (!schema.ok()) return schema.error();
   recording::Channel channel{next_channel_, *schema, sample.topic, "cdr", {}};
-  channel.metadata = {{"writer", sample.writer}, {"type", topic.type}};
+  channel.metadata = {{"writer", sample.writer},
+                      {"type", topic.type},
+                      {"keyed", topic.keyed ? "true" : "false"},
+                      {"reliability", topic.reliable ? "reliable" : "best_effort"},
+                      {"durability", topic.transient_local ? "transient_local" : "volatile"}};
+  if (topic.deadline > Duration(0)) {
+    channel.metadata["deadline_s"] = FormatDouble(ToSeconds(topic.deadline));
+  }
   if (!source.empty()) channel.metadata["source"] = source;
   if (const Status added = writer_->AddChannel(channel); !added.ok()) return added.error();
-  of_topic[sample.writer] = next_channel_;
+  of_writer.push_back({sample.topic, next_channel_});
   return next_channel_++;
 }
 

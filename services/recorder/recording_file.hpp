@@ -2,6 +2,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "exemplar/ircp/bus.hpp"
@@ -20,13 +21,15 @@ struct RecordingInfo {
   std::string previous_file;                    ///< of the part before, without folder
 };
 
-/// One recording as MCAP: a channel for each writer of a topic (its metadata names writer and
-/// source), schemas as flattened IDL ("omgidl"), messages as "cdr"; log time is reception, publish
-/// time the source's stamp, sequence the low 32 bits of the protocol's number. Metadata records:
+/// One recording as MCAP: a channel for each writer of a topic (its metadata names writer, source,
+/// type and quality of service, as a replay needs them), schemas as flattened IDL ("omgidl"),
+/// messages as "cdr"; log time is reception, publish time the source's stamp, sequence the low 32
+/// bits of the protocol's number. Metadata records:
 ///   exemplar.recording   name, station, times; of a part its number and its neighbours' files
 ///   exemplar.trial       the caller's
 ///   exemplar.losses      one a writer and topic: received, lost by cause, since the recording (not
 ///                        the part) began; again whenever they grew, so the last of a writer counts
+///   exemplar.clock       one a program: how its clock stands to ours, now and then
 ///   exemplar.pause, exemplar.resume, exemplar.event   when, and what came with it
 /// Thread-compatible.
 class RecordingFile {
@@ -60,7 +63,11 @@ class RecordingFile {
   std::unique_ptr<recording::Writer> writer_;
   RecordingInfo info_;
   std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;  ///< by type and text
-  std::map<std::string, std::map<std::string, std::uint16_t>> channels_;  ///< by topic and writer
+  struct ChannelOfTopic {
+    std::string topic;
+    std::uint16_t id = 0;
+  };
+  std::unordered_map<std::string, std::vector<ChannelOfTopic>> channels_;  ///< by writer
   std::uint16_t next_channel_ = 1;
   bool unsynced_ = false;
 };

@@ -35,6 +35,8 @@ LIBRARIES = {
     "perception": ["base", "geometry", "scene"],
     "recording": ["base"],
     "ircp": ["base", "geometry", "demonstration"],
+    "joining": ["base", "ircp", "recording"],
+    "replay": ["base", "ircp", "recording"],
     "api": ["base", "geometry", "demonstration", "learning"],
     "figures": ["base", "geometry", "learning"],
     "program": ["base"],

@@ -32,7 +32,8 @@ class LossLedgerTest : public ::testing::Test {
     sample.topic = kSuit;
     sample.writer = writer;
     sample.sequence = 1000 + seq;  // the protocol's own count differs
-    ledger_.AddReceived(sample, SampleHeader{source, seq}, now_);
+    sample.cdr = SampleBytes(source, seq);
+    ledger_.AddReceived(sample, now_);
   }
   void ReceiveStrange(std::uint64_t sequence, bool valid = true) {
     ircp::RawSample sample;
@@ -40,7 +41,7 @@ class LossLedgerTest : public ::testing::Test {
     sample.writer = "09|1";
     sample.sequence = sequence;
     sample.valid = valid;
-    ledger_.AddReceived(sample, std::nullopt, now_);
+    ledger_.AddReceived(sample, now_);
   }
   api::TopicFigures Figures(const std::string& topic) const {
     for (const api::TopicFigures& figures : ledger_.TopicFigures(now_)) {
@@ -66,23 +67,34 @@ TEST_F(LossLedgerTest, CountsGapsAndFillsThemByLateSamples) {
 
 TEST_F(LossLedgerTest, CountsTheEndUpToWhatTheWriterAnnounced) {
   for (std::uint64_t seq = 1; seq <= 10; ++seq) Receive(seq);
-  EXPECT_TRUE(ledger_.HasAllAnnounced());
-  ledger_.AddAnnounced("01.0f.aa|0.0.9.3", {kSuit, "suit", 13});
-  EXPECT_FALSE(ledger_.HasAllAnnounced());
+  EXPECT_TRUE(ledger_.HasAllAnnounced(now_));
+  ledger_.AddAnnounced("01.0f.aa|0.0.9.3", {kSuit, "suit", 13}, now_);
+  EXPECT_FALSE(ledger_.HasAllAnnounced(now_));
   EXPECT_EQ(Figures(kSuit).lost, 3u);
   EXPECT_EQ(Figures(kSuit).sent, 13u);
   Receive(13);
-  EXPECT_TRUE(ledger_.HasAllAnnounced());
+  EXPECT_TRUE(ledger_.HasAllAnnounced(now_));
   EXPECT_EQ(Figures(kSuit).lost, 2u);
   Receive(14);
   EXPECT_EQ(Figures(kSuit).sent, 14u);
 }
 
+TEST_F(LossLedgerTest, AwaitsNothingMoreOfAWriterThatHasDied) {
+  for (std::uint64_t seq = 1; seq <= 10; ++seq) Receive(seq);
+  ledger_.AddAnnounced("01.0f.aa|0.0.9.3", {kSuit, "suit", 13}, now_);
+  EXPECT_FALSE(ledger_.HasAllAnnounced(now_));
+  now_ += std::chrono::seconds(3);
+  EXPECT_TRUE(ledger_.HasAllAnnounced(now_));
+  EXPECT_EQ(Figures(kSuit).lost, 3u);
+  ledger_.AddAnnounced("01.0f.aa|0.0.9.3", {kSuit, "suit", 14}, now_);
+  EXPECT_FALSE(ledger_.HasAllAnnounced(now_));
+}
+
 TEST_F(LossLedgerTest, KeepsARestartedProgramApartFromItsFormerLife) {
   for (std::uint64_t seq = 1; seq <= 10; ++seq) Receive(seq);
-  ledger_.AddAnnounced("01.0f.aa|0.0.9.3", {kSuit, "suit", 12});
+  ledger_.AddAnnounced("01.0f.aa|0.0.9.3", {kSuit, "suit", 12}, now_);
   for (std::uint64_t seq = 1; seq <= 5; ++seq) Receive(seq, "02.0f.bb|0.0.1.3");
-  ledger_.AddAnnounced("02.0f.bb|0.0.9.3", {kSuit, "suit", 5});
+  ledger_.AddAnnounced("02.0f.bb|0.0.9.3", {kSuit, "suit", 5}, now_);
   EXPECT_EQ(Figures(kSuit).received, 15u);
   EXPECT_EQ(Figures(kSuit).lost, 2u);
   EXPECT_EQ(Figures(kSuit).sent, 17u);

@@ -1,12 +1,15 @@
-#include "recorder/sample_header.hpp"
+#include "exemplar/ircp/sample_header.hpp"
 
 #include <gmock/gmock.h>
 
 #include "cdr.hpp"
 #include "exemplar/base/rng.hpp"
 
-namespace exemplar::recorder {
+namespace exemplar::ircp {
 namespace {
+
+using recorder::HeaderIdl;
+using recorder::SampleBytes;
 
 TEST(SampleHeader, IsReadInEitherByteOrderForAnyNameLength) {
   for (const bool little_endian : {true, false}) {
@@ -65,4 +68,4 @@ TEST(SampleHeader, IsNotReadBeyondTheBytesWhateverTheyAre) {
 }
 
 }  // namespace
-}  // namespace exemplar::recorder
+}  // namespace exemplar::ircp

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,8 +19,9 @@ namespace exemplar::bus {
 
 /// One sample on its way.
 struct Bytes {
-  std::vector<std::uint8_t> cdr;       ///< with its encapsulation header
-  std::array<std::uint8_t, 16> key{};  ///< of the instance; only writers need it
+  std::vector<std::uint8_t> cdr;        ///< with its encapsulation header
+  std::array<std::uint8_t, 16> key{};   ///< of the instance; only writers need it
+  std::optional<Stamp> source_stamp{};  ///< for writers: instead of the time of writing
 };
 
 /// One sample that came.
@@ -37,6 +39,7 @@ using OnArrival = std::function<void(Arrival&&)>;
 struct TypeInfo {
   std::string_view name;
   std::string_view schema;  ///< flattened IDL
+  bool keyed = true;
 };
 
 /// Thread-safe.
@@ -68,6 +71,10 @@ class DdsStation {
                                                          const TypeInfo& type, const TopicQos& qos,
                                                          OnArrival on_arrival) = 0;
 };
+
+/// Sends bytes as they are under the type's name.
+Result<std::unique_ptr<ircp::RawWriter>> OpenRawWriter(DdsStation& station,
+                                                       const ircp::RawTopic& topic);
 
 /// The raw side has a participant of its own: a topic has one type support a participant, and the
 /// program's own readers hold theirs.

@@ -57,7 +57,11 @@ class DdsWriter final : public ByteWriter {
   }
 
   Status Write(Bytes& bytes) override {
-    if (!writer_.write(&bytes)) {
+    rtps::WriteParams parameters;
+    if (bytes.source_stamp) {
+      parameters.source_timestamp().from_ns(bytes.source_stamp->nanoseconds());
+    }
+    if (!writer_.write(&bytes, parameters)) {
       return Error{ErrorCode::kResourceExhausted,
                    "topic " + topic_ + ": Fast DDS did not take a sample of " +
                        std::to_string(bytes.cdr.size()) +
@@ -145,7 +149,7 @@ class Station final : public DdsStation {
     const std::string type_name(type.name);
     const auto known = topics_.find(topic);
     if (known == topics_.end()) {
-      Result<dds::Topic*> made = MakeTopic(*participant_, topic, type_name, true);
+      Result<dds::Topic*> made = MakeTopic(*participant_, topic, type_name, type.keyed);
       if (made.ok()) topics_[topic] = *made;
       return made;
     }

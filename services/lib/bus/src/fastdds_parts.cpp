@@ -1,6 +1,7 @@
 #include "fastdds_parts.hpp"
 
 #include <arpa/inet.h>
+#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/attributes/LibrarySettingsAttributes.h>
@@ -16,6 +17,7 @@
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -125,6 +127,28 @@ Result<rtps::LocatorList_t> InitialPeers(int domain, const std::vector<std::stri
   return list;
 }
 
+using DiscoveryServers = eprosima::fastdds::rtps::RemoteServerList_t;
+
+Result<DiscoveryServers> FindDiscoveryServers(const std::vector<std::string>& addresses) {
+  DiscoveryServers servers;
+  for (const std::string& address : addresses) {
+    const std::size_t colon = address.rfind(':');
+    const std::optional<long long> port =
+        colon == std::string::npos ? std::nullopt : ParseInteger(address.substr(colon + 1));
+    // Its place in the list tells the server's id, and so its identity on the network.
+    DiscoveryServers found;
+    const std::string place(servers.size(), ';');
+    if (!port || *port < 1 || *port > 65535 || address.find(';') != std::string::npos ||
+        !eprosima::fastdds::rtps::load_environment_server_info(place + address, found) ||
+        found.size() != 1) {
+      return InvalidArgument("discovery server \"" + address + "\" is not the HOST:PORT of a host",
+                             "discovery-server");
+    }
+    servers.push_back(found.front());
+  }
+  return servers;
+}
+
 }  // namespace
 
 BytesType::BytesType(const std::string& type_name, bool keyed) {
@@ -179,6 +203,8 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
   if (!interfaces.ok()) return interfaces.error();
   Result<rtps::LocatorList_t> peers = InitialPeers(options.domain, options.peers);
   if (!peers.ok()) return peers.error();
+  Result<DiscoveryServers> servers = FindDiscoveryServers(options.discovery_servers);
+  if (!servers.ok()) return servers.error();
 
   // Within one process, too, samples take the network's way: otherwise callbacks would run on the
   // writing thread, under the writer's locks.
@@ -195,7 +221,13 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(kLeaseSeconds, 0);
   discovery.leaseDuration_announcementperiod =
       eprosima::fastrtps::Duration_t(kAnnouncementSeconds, 0);
-  qos.wire_protocol().builtin.initialPeersList = *peers;
+  if (servers->empty()) {
+    qos.wire_protocol().builtin.initialPeersList = *peers;
+  } else {
+    discovery.discoveryProtocol = listener == nullptr ? rtps::DiscoveryProtocol_t::CLIENT
+                                                      : rtps::DiscoveryProtocol_t::SUPER_CLIENT;
+    discovery.m_DiscoveryServers = std::move(*servers);
+  }
 
   qos.transport().use_builtin_transports = false;
   if (const std::uint32_t bytes = SharedMemoryBytes(options.shared_memory_bytes); bytes > 0) {

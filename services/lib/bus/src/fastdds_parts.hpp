@@ -39,7 +39,8 @@ struct ParticipantDeleter {
 };
 using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
 
-/// `listener` may be null; it outlives the participant.
+/// `listener` may be null; it outlives the participant. With one, the participant is told by a
+/// discovery server of all endpoints, not only of those that match its own.
 Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
                                           dds::DomainParticipantListener* listener);
 

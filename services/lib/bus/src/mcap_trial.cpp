@@ -8,6 +8,7 @@
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/bus/codec.hpp"
+#include "exemplar/ircp/clock_relation.hpp"
 #include "exemplar/ircp/sequence_set.hpp"
 #include "exemplar/ircp/trial_builder.hpp"
 #include "exemplar/recording/reader.hpp"
@@ -19,7 +20,8 @@ using demonstration::Trial;
 
 class TrialReader {
  public:
-  explicit TrialReader(std::string_view source) : source_(source) {}
+  TrialReader(std::string_view source, std::map<std::string, ircp::ClockTrack> clocks)
+      : source_(source), clocks_(std::move(clocks)) {}
 
   Status Take(const recording::Record& record) {
     if (const auto* schema = std::get_if<recording::Schema>(&record)) {
@@ -48,6 +50,12 @@ class TrialReader {
     }
     for (const auto& [name, value] : labels_) {
       notices.push_back("label " + name + ": " + value);
+    }
+    for (const std::string& participant : set_right_) {
+      const ircp::ClockRelation& last = clocks_.at(participant).relations().back();
+      notices.push_back("clock of " + last.program + ": " + FormatFixed(ToSeconds(last.offset), 6) +
+                        " s ahead of the recorder's, within " +
+                        FormatFixed(ToSeconds(last.uncertainty), 6) + " s; taken off its stamps");
     }
     for (const std::string& topic : strangers_) {
       notices.push_back(topic + ": not a topic of ours, left alone");
@@ -93,7 +101,7 @@ class TrialReader {
                                              channel.message_encoding + "\", expected " +
                                              std::string(TypeNameOf<Sample>()) + " as cdr"};
     }
-    const Result<Sample> sample = Decode<Sample>(message.data);
+    Result<Sample> sample = Decode<Sample>(message.data);
     if (!sample.ok()) return sample.error();
     const auto named = channel.metadata.find("writer");
     const std::string writer =
@@ -103,8 +111,18 @@ class TrialReader {
       ++repeated_[channel.topic];
       return {};
     }
+    SetRight(ircp::ParticipantOf(writer), message.log_time, sample->header.stamp);
     builder_.Add(*sample);
     return {};
+  }
+
+  /// A stamp of another machine's clock becomes the recorder's.
+  void SetRight(const std::string& participant, Stamp received, Stamp& stamp) {
+    const auto clock = clocks_.find(participant);
+    if (clock == clocks_.end() || !clock->second.Differs()) return;
+    if (!ircp::IsOfOurTime(stamp) || !ircp::IsOfOurTime(received)) return;
+    stamp = stamp - clock->second.OffsetAt(received);
+    set_right_.insert(participant);
   }
 
   std::string TypeOf(const recording::Channel& channel) const {
@@ -144,6 +162,8 @@ class TrialReader {
   std::map<std::pair<std::string, std::string>, std::uint64_t> lost_at_end_of_;
   recording::StringMap labels_;
   std::set<std::string> strangers_;
+  const std::map<std::string, ircp::ClockTrack> clocks_;  ///< by participant
+  std::set<std::string> set_right_;
 };
 
 Error NotWhole(const Error& error, std::string_view source) {
@@ -152,13 +172,31 @@ Error NotWhole(const Error& error, std::string_view source) {
   return placed;
 }
 
+/// How the programs' clocks stood to the recorder's; empty where the file does not tell.
+Result<std::map<std::string, ircp::ClockTrack>> ReadClocks(recording::ByteSource& file) {
+  std::map<std::string, ircp::ClockTrack> clocks;
+  const auto reader = recording::IndexedReader::Open(file);
+  if (!reader.ok()) return clocks;  // what is wrong is said by who reads the messages
+  for (const recording::MetadataIndex& index : (*reader)->metadata()) {
+    if (index.name != "exemplar.clock") continue;
+    const Result<recording::Metadata> metadata = (*reader)->ReadMetadata(index);
+    if (!metadata.ok()) return metadata.error();
+    Result<ircp::ClockRelation> relation = ircp::ClockRelationFromFields(metadata->metadata);
+    if (!relation.ok()) return WithPlace(relation.error(), "metadata exemplar.clock");
+    clocks[relation->participant].Add(std::move(*relation));
+  }
+  return clocks;
+}
+
 }  // namespace
 
 Result<Trial> ReadTrialFromMcap(std::string_view bytes, std::string_view source) {
   recording::MemorySource file({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
   Result<std::unique_ptr<recording::StreamReader>> reader = recording::StreamReader::Create(file);
   if (!reader.ok()) return WithPlace(reader.error(), source);
-  TrialReader trial(source);
+  Result<std::map<std::string, ircp::ClockTrack>> clocks = ReadClocks(file);
+  if (!clocks.ok()) return WithPlace(clocks.error(), source);
+  TrialReader trial(source, std::move(*clocks));
   while (true) {
     Result<std::optional<recording::Record>> record = (*reader)->Next();
     if (!record.ok()) return NotWhole(record.error(), source);

@@ -1,5 +1,6 @@
 #include "exemplar/bus/participant.hpp"
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "exemplar/ircp/bus_of.hpp"
 #include "exemplar/ircp/check.hpp"
 #include "exemplar/ircp/sequence_set.hpp"
+#include "refusals.hpp"
 
 namespace exemplar::bus {
 namespace {
@@ -91,14 +93,18 @@ class Tally {
 
 class SampleReader final : public ircp::Reader {
  public:
-  /// `reader` feeds `tally`.
-  SampleReader(std::unique_ptr<ByteReader> reader, std::shared_ptr<Tally> tally)
-      : tally_(std::move(tally)), reader_(std::move(reader)) {}
+  /// `reader` feeds `tally` and `refusals`.
+  SampleReader(std::unique_ptr<ByteReader> reader, std::shared_ptr<Tally> tally,
+               std::shared_ptr<Refusals> refusals)
+      : tally_(std::move(tally)), refusals_(std::move(refusals)), reader_(std::move(reader)) {}
   int matched_writers() const override { return reader_->matched_writers(); }
   std::vector<ircp::SourceCount> counts() const override { return tally_->counts(); }
+  std::uint64_t refused() const override { return refusals_->total(); }
 
  private:
-  std::shared_ptr<Tally> tally_;  ///< shared with the callback of reader_
+  // Shared with the callback of reader_.
+  std::shared_ptr<Tally> tally_;
+  std::shared_ptr<Refusals> refusals_;
   std::unique_ptr<ByteReader> reader_;
 };
 
@@ -115,7 +121,7 @@ class DdsParticipant final : public ircp::BusOf<DdsParticipant, Participant> {
           "topic " + topic + ": source \"" + source + "\" must have 1 to 255 bytes", "source");
     }
     Result<std::unique_ptr<ByteWriter>> writer =
-        station_->MakeWriter(topic, TypeInfoOf<Sample>(), QosOf<Sample>());
+        station_->MakeWriter(topic, TypeInfoOf<Sample>(), QosFor<Sample>(topic));
     if (!writer.ok()) return writer.error();
     return std::unique_ptr<ircp::Writer<Sample>>(
         std::make_unique<SampleWriter<Sample>>(std::move(*writer), source, *options_.clock));
@@ -125,31 +131,44 @@ class DdsParticipant final : public ircp::BusOf<DdsParticipant, Participant> {
   Result<std::unique_ptr<ircp::Reader>> OpenReader(const std::string& topic,
                                                    ircp::Callback<Sample> callback) {
     auto tally = std::make_shared<Tally>();
-    auto on_arrival = [tally, topic, log = options_.log,
-                       callback = std::move(callback)](Arrival&& arrival) {
+    auto refusals = std::make_shared<Refusals>(topic, *options_.clock, *options_.log);
+    auto on_arrival = [tally, refusals, callback = std::move(callback)](Arrival&& arrival) {
       if (!arrival.valid) return;
       Result<Sample> sample = Decode<Sample>(arrival.cdr);
       if (!sample.ok()) {
-        log->Warning(
-            "sample refused",
-            {{"topic", topic}, {"writer", arrival.writer}, {"error", sample.error().message}});
+        refusals->Add(arrival.writer, sample.error().message);
         return;
       }
+      refusals->Tick();
       tally->Add(arrival.writer, sample->header);
       callback(*sample, {.writer = std::move(arrival.writer), .received = arrival.received});
     };
-    Result<std::unique_ptr<ByteReader>> reader =
-        station_->MakeReader(topic, TypeInfoOf<Sample>(), QosOf<Sample>(), std::move(on_arrival));
+    Result<std::unique_ptr<ByteReader>> reader = station_->MakeReader(
+        topic, TypeInfoOf<Sample>(), QosFor<Sample>(topic), std::move(on_arrival));
     if (!reader.ok()) return reader.error();
     return std::unique_ptr<ircp::Reader>(
-        std::make_unique<SampleReader>(std::move(*reader), std::move(tally)));
+        std::make_unique<SampleReader>(std::move(*reader), std::move(tally), std::move(refusals)));
   }
 
   Result<std::unique_ptr<ircp::RawTap>> MakeTap(ircp::RawTapOptions tap_options) override {
     return MakeRawTap(options_, std::move(tap_options));
   }
 
+  Result<std::unique_ptr<ircp::RawWriter>> MakeRawWriter(const ircp::RawTopic& topic) override {
+    return OpenRawWriter(*station_, topic);
+  }
+
  private:
+  template <class Sample>
+  TopicQos QosFor(const std::string& topic) const {
+    TopicQos qos = QosOf<Sample>();
+    const std::vector<std::string>& best_effort = options_.best_effort_topics;
+    if (std::find(best_effort.begin(), best_effort.end(), topic) != best_effort.end()) {
+      qos.reliable = false;
+    }
+    return qos;
+  }
+
   ParticipantOptions options_;  ///< clock and log are set
   std::unique_ptr<DdsStation> station_;
 };

@@ -2,12 +2,14 @@
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
 
 #include <algorithm>
+#include <compare>
 #include <condition_variable>
 #include <deque>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/subscriber/qos/SubscriberQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <map>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -35,6 +37,9 @@ struct Kind {
   friend auto operator<=>(const Kind&, const Kind&) = default;
 };
 
+/// The partition of writers that name none, as other middlewares' do by default.
+constexpr const char* kNoPartition = "";
+
 /// What discovery says of one writer.
 struct Discovered {
   RawTopic topic;
@@ -51,6 +56,12 @@ std::string SchemaFrom(const std::vector<rtps::octet>& user_data) {
   return printable && text.find("struct ") != std::string::npos ? text : std::string();
 }
 
+/// 0 where the writer promises none.
+Duration DeadlineFrom(const eprosima::fastrtps::Duration_t& period) {
+  if (period == eprosima::fastrtps::c_TimeInfinite) return Duration(0);
+  return std::chrono::seconds(period.seconds) + Duration(period.nanosec);
+}
+
 class Tap final : public RawTap, private dds::DomainParticipantListener {
  public:
   Tap(RawTapOptions options, std::string station, const Clock& clock, Log& log)
@@ -60,12 +71,14 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
   Status Start(const ParticipantOptions& options) {
     Result<ParticipantPtr> participant = MakeDdsParticipant(options, this);
     if (!participant.ok()) return participant.error();
-    dds::SubscriberQos qos;
-    qos.partition().push_back(station_.c_str());
-    dds::Subscriber* subscriber = (*participant)->create_subscriber(qos);
-    if (subscriber == nullptr) return Internal("Fast DDS made no subscriber");
+    for (const std::string& partition : {station_, std::string(kNoPartition)}) {
+      dds::SubscriberQos qos;
+      if (!partition.empty()) qos.partition().push_back(partition.c_str());
+      dds::Subscriber* subscriber = (*participant)->create_subscriber(qos);
+      if (subscriber == nullptr) return Internal("Fast DDS made no subscriber");
+      subscribers_[partition] = subscriber;
+    }
     participant_ = std::move(*participant);
-    subscriber_ = subscriber;
     worker_ = std::jthread([this](std::stop_token stop) { Work(std::move(stop)); });
     return {};
   }
@@ -89,7 +102,7 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
     {
       const std::lock_guard lock(mutex_);
       for (const auto& [key, entry] : readers_) {
-        if (key.first == topic) readers.push_back(entry.reader);
+        if (key.topic == topic) readers.push_back(entry.reader);
       }
     }
     // A best-effort reader matches the writers of the others, too.
@@ -107,13 +120,29 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
     std::unique_ptr<ArrivalGate> gate;
     dds::DataReader* reader = nullptr;
   };
-  using ReaderKey = std::pair<std::string, Kind>;
+  struct ReaderKey {
+    std::string topic;
+    std::string partition;
+    Kind kind;
+    friend auto operator<=>(const ReaderKey&, const ReaderKey&) = default;
+  };
+
+  /// Where the writer is to be read; nullopt for those that are none of ours: of another station,
+  /// or with our topics' names outside of every station.
+  std::optional<std::string> PartitionOf(const std::vector<std::string>& names,
+                                         const std::string& topic) const {
+    if (std::find(names.begin(), names.end(), station_) != names.end()) return station_;
+    const bool without = names.empty() || std::find(names.begin(), names.end(), "") != names.end();
+    if (!without || topic.starts_with("ircp/")) return std::nullopt;
+    return kNoPartition;
+  }
 
   // On a thread of the network: only notes what happened.
   void on_publisher_discovery(dds::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) override {
     const auto& qos = info.info.m_qos;
-    const std::vector<std::string> partitions = qos.m_partition.names();
-    if (std::find(partitions.begin(), partitions.end(), station_) == partitions.end()) return;
+    const std::string topic = info.info.topicName().to_string();
+    const std::optional<std::string> partition = PartitionOf(qos.m_partition.names(), topic);
+    if (!partition) return;
     const std::string writer = ToText(info.info.guid());
     const Kind kind{
         .reliable = qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS,
@@ -122,12 +151,14 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
     const std::lock_guard lock(mutex_);
     if (info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) return;
     writer_kinds_[writer] = kind;
-    queue_.push_back({.topic = {.topic = info.info.topicName().to_string(),
+    queue_.push_back({.topic = {.topic = topic,
                                 .type = info.info.typeName().to_string(),
                                 .schema = SchemaFrom(qos.m_userData.data_vec()),
-                                .partition = station_,
+                                .partition = *partition,
                                 .keyed = info.info.topicKind() == rtps::WITH_KEY,
-                                .reliable = kind.reliable},
+                                .reliable = kind.reliable,
+                                .transient_local = kind.transient_local,
+                                .deadline = DeadlineFrom(qos.m_deadline.period)},
                       .kind = kind});
     queued_.notify_one();
   }
@@ -154,7 +185,7 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
   }
 
   void Follow(const Discovered& found) {
-    const ReaderKey key{found.topic.topic, found.kind};
+    const ReaderKey key{found.topic.topic, found.topic.partition, found.kind};
     {
       const std::lock_guard lock(mutex_);
       if (readers_.count(key) != 0) return;
@@ -164,20 +195,22 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
       Result<dds::Topic*> made =
           MakeTopic(*participant_, found.topic.topic, found.topic.type, found.topic.keyed);
       if (!made.ok()) {
-        log_.Warning("topic not read", {{"topic", key.first}, {"error", made.error().message}});
+        log_.Warning("topic not read", {{"topic", key.topic}, {"error", made.error().message}});
         return;
       }
       topic = *made;
     }
     TopicReader entry;
     entry.gate = std::make_unique<ArrivalGate>(clock_, [this, key](Arrival&& arrival) {
-      HandOn(key.first, key.second, std::move(arrival));
+      HandOn(key.topic, key.kind, std::move(arrival));
     });
-    entry.reader = subscriber_->create_datareader(
-        topic, ReaderQos(found.kind.reliable, found.kind.transient_local, kMaxSamples),
-        entry.gate.get(), dds::StatusMask::data_available());
+    entry.reader =
+        subscribers_.at(key.partition)
+            ->create_datareader(
+                topic, ReaderQos(found.kind.reliable, found.kind.transient_local, kMaxSamples),
+                entry.gate.get(), dds::StatusMask::data_available());
     if (entry.reader == nullptr) {
-      log_.Warning("topic not read", {{"topic", key.first}, {"error", "Fast DDS refused"}});
+      log_.Warning("topic not read", {{"topic", key.topic}, {"error", "Fast DDS refused"}});
       return;
     }
     const std::lock_guard lock(mutex_);
@@ -205,7 +238,7 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
   const Clock& clock_;
   Log& log_;
   ParticipantPtr participant_;
-  dds::Subscriber* subscriber_ = nullptr;
+  std::map<std::string, dds::Subscriber*> subscribers_;  ///< by partition; fixed after Start
 
   mutable std::mutex mutex_;  ///< guards the five below; never held while Fast DDS is called
   std::condition_variable_any queued_;

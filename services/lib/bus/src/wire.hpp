@@ -2,6 +2,8 @@
 // Sample values to the generated message types and back: one Wire<Sample> each.
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +25,9 @@
 namespace exemplar::bus {
 
 namespace v1 = ::exemplar::ircp::v1;
+
+/// Stands for a position that was not measured.
+inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 inline v1::Pose ToMessage(const geometry::Pose& pose) {
   v1::Pose message;
@@ -90,7 +95,8 @@ struct Wire<ircp::EndEffectorSample> {
   static void Fill(const ircp::EndEffectorSample& sample, Message& message) {
     message.hand(sample.hand);
     message.base_T_tool(ToMessage(sample.base_T_tool));
-    message.has_orientation(sample.has_orientation);
+    if (!sample.has_pose) message.base_T_tool().position_m().fill(kNotMeasured);
+    message.has_orientation(sample.has_pose && sample.has_orientation);
     message.has_hand_open(sample.has_hand_open);
     message.hand_open(sample.hand_open);
     message.has_wrench(sample.has_wrench);
@@ -100,7 +106,10 @@ struct Wire<ircp::EndEffectorSample> {
   }
   static void Fill(Message& message, ircp::EndEffectorSample& sample) {
     sample.hand = std::move(message.hand());
-    sample.base_T_tool = FromMessage(message.base_T_tool());
+    const auto& position = message.base_T_tool().position_m();
+    sample.has_pose = !std::all_of(position.begin(), position.end(),
+                                   [](double value) { return std::isnan(value); });
+    if (sample.has_pose) sample.base_T_tool = FromMessage(message.base_T_tool());
     sample.has_orientation = message.has_orientation();
     sample.has_hand_open = message.has_hand_open();
     sample.hand_open = message.hand_open();

@@ -64,6 +64,11 @@ class Checks {
     return *this;
   }
 
+  Checks& PoseIf(bool there, std::string_view field, const geometry::Pose& pose,
+                 bool has_orientation) {
+    return there ? Pose(field, pose, has_orientation) : *this;
+  }
+
   const Status& status() const { return status_; }
 
  private:
@@ -88,7 +93,7 @@ Status Check(const EndEffectorSample& sample) {
   return Checks()
       .Key("source", sample.header.source)
       .Key("hand", sample.hand, true)
-      .Pose("base_T_tool", sample.base_T_tool, sample.has_orientation)
+      .PoseIf(sample.has_pose, "base_T_tool", sample.base_T_tool, sample.has_orientation)
       .Finite("hand_open", sample.hand_open)
       .Finite("wrench", sample.wrench)
       .status();

@@ -8,6 +8,7 @@
 
 #include "exemplar/base/ids.hpp"
 #include "exemplar/base/rng.hpp"
+#include "exemplar/ircp/clock_watch.hpp"
 #include "exemplar/ircp/control.hpp"
 
 namespace exemplar::ircp {
@@ -37,6 +38,7 @@ class Server final : public ControlServer {
   }
 
   ~Server() override {
+    clock_responder_.reset();
     others_.reset();
     reader_.reset();  // no command comes any more
     heartbeat_ = {};
@@ -57,6 +59,9 @@ class Server final : public ControlServer {
         [this](const StatusSample& status, const Reception& from) { Meet(status, from); });
     if (!others) return others.error();
     others_ = std::move(*others);
+    auto clock_responder = ClockResponder::Create(bus, clock_, program_);
+    if (!clock_responder) return clock_responder.error();
+    clock_responder_ = std::move(*clock_responder);
     worker_ = std::jthread([this](const std::stop_token& stop) { Work(stop); });
     heartbeat_ = std::jthread([this](const std::stop_token& stop) {
       do {
@@ -214,6 +219,7 @@ class Server final : public ControlServer {
 
   std::unique_ptr<Reader> reader_;
   std::unique_ptr<Reader> others_;
+  std::unique_ptr<ClockResponder> clock_responder_;
   std::jthread worker_;
   std::jthread heartbeat_;
 };

@@ -16,7 +16,7 @@ Metric SentMetric(const std::string& prefix, std::function<std::vector<TopicCoun
 }
 
 std::vector<Metric> ReceivedMetrics(const std::string& prefix, std::vector<TopicReader> readers) {
-  const auto each = [readers = std::move(readers)](std::uint64_t SourceCount::*number) {
+  const auto each = [readers](std::uint64_t SourceCount::*number) {
     return [readers, number] {
       std::vector<Metric::Value> values;
       for (const TopicReader& from : readers) {
@@ -29,9 +29,18 @@ std::vector<Metric> ReceivedMetrics(const std::string& prefix, std::vector<Topic
       return values;
     };
   };
+  const auto refused = [readers] {
+    std::vector<Metric::Value> values;
+    for (const TopicReader& from : readers) {
+      if (from.reader == nullptr) continue;
+      values.push_back({{{"topic", from.topic}}, static_cast<double>(from.reader->refused())});
+    }
+    return values;
+  };
   return {{prefix + "_received_total", "Samples received", true, each(&SourceCount::received)},
           {prefix + "_lost_total", "Samples that were sent and never came", true,
-           each(&SourceCount::lost)}};
+           each(&SourceCount::lost)},
+          {prefix + "_refused_total", "Samples that were malformed", true, refused}};
 }
 
 Metric StateMetric(const std::string& prefix, std::vector<std::string> states,

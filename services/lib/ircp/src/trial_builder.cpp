@@ -75,9 +75,11 @@ void TrialBuilder::Add(const JointStateSample& sample) {
 }
 
 void TrialBuilder::Add(const EndEffectorSample& sample) {
-  Poses& hand = FindOrAdd(hands_, sample.hand);
-  hand.has_orientation = hand.has_orientation && sample.has_orientation;
-  hand.poses.emplace_back(sample.header.stamp, sample.base_T_tool);
+  if (sample.has_pose) {
+    Poses& hand = FindOrAdd(hands_, sample.hand);
+    hand.has_orientation = hand.has_orientation && sample.has_orientation;
+    hand.poses.emplace_back(sample.header.stamp, sample.base_T_tool);
+  }
   if (sample.has_hand_open) {
     Rows& opening = openings_[sample.hand];
     opening.names = {sample.hand};
@@ -124,6 +126,9 @@ Result<Trial> TrialBuilder::Build(std::string source) const {
   for (const auto* named : {&hands_, &objects_}) {
     for (const auto& [name, series] : *named) earliest(series.poses);
   }
+  for (const auto& [name, opening] : openings_) earliest(opening.rows);
+  earliest(wrench_.rows);
+  earliest(label_.rows);
   trial.start = start;
 
   const auto scalars = [&](const Rows& rows, const std::string& stream) {
@@ -173,6 +178,8 @@ Result<Trial> TrialBuilder::Build(std::string source) const {
   };
 
   trial.joints = only(joints, "joints");
+  // Beside a suit, the robot is the one that follows it.
+  if (!suits_.empty()) trial.measured_joints = only(states_, "measured joints");
   trial.tactile = only(touch, "tactile");
   trial.end_effectors.resize(hands_.size());
   for (const auto& [name, hand] : hands_) {

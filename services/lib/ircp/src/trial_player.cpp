@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <utility>
 
 namespace exemplar::ircp {
 namespace {
@@ -10,23 +12,27 @@ namespace {
 using demonstration::PoseSeries;
 using demonstration::ScalarSeries;
 
-/// Finds the rows of a series by time, and remembers which were used.
+/// Finds the rows of a series by time, and remembers which were not asked for.
 class RowsByTime {
  public:
   explicit RowsByTime(const ScalarSeries& series) : series_(series) {}
 
   std::optional<Eigen::Index> At(double time_s) {
-    while (next_ < series_.time_s.size() && series_.time_s[next_] < time_s) ++next_;
+    while (next_ < series_.time_s.size() && series_.time_s[next_] < time_s) Pass();
     if (next_ == series_.time_s.size() || series_.time_s[next_] != time_s) return std::nullopt;
-    ++used_;
     return static_cast<Eigen::Index>(next_++);
   }
-  std::size_t unused() const { return series_.time_s.size() - used_; }
+  std::vector<std::size_t> TakeUnused() {
+    while (next_ < series_.time_s.size()) Pass();
+    return std::move(unused_);
+  }
 
  private:
+  void Pass() { unused_.push_back(next_++); }
+
   const ScalarSeries& series_;
   std::size_t next_ = 0;
-  std::size_t used_ = 0;
+  std::vector<std::size_t> unused_;
 };
 
 std::optional<Eigen::Index> ChannelOf(const ScalarSeries& series, const std::string& name) {
@@ -40,10 +46,44 @@ std::vector<double> RowOf(const ScalarSeries& series, Eigen::Index row) {
   return {values.begin(), values.end()};
 }
 
-void NoticeUnused(const RowsByTime& rows, const std::string& what, TrialSamples& out) {
-  if (rows.unused() == 0) return;
-  out.notices.push_back(what + ": " + std::to_string(rows.unused()) +
-                        " samples at times without a tool pose are not sent");
+/// What was measured of a hand at times without a tool pose.
+class Poseless {
+ public:
+  EndEffectorSample& At(const std::string& hand, double time_s) {
+    EndEffectorSample& sample = samples_[{hand, time_s}];
+    sample.hand = hand;
+    sample.has_pose = false;
+    sample.has_orientation = false;
+    return sample;
+  }
+  template <class Stamps>
+  void MoveTo(std::vector<TrialSample>& out, const Stamps& stamp) {
+    for (auto& [where, sample] : samples_) {
+      sample.header.stamp = stamp(where.second);
+      out.emplace_back(std::move(sample));
+    }
+  }
+
+ private:
+  std::map<std::pair<std::string, double>, EndEffectorSample> samples_;
+};
+
+void SetOpening(const ScalarSeries& hands, Eigen::Index row, Eigen::Index channel,
+                EndEffectorSample& sample) {
+  sample.has_hand_open = true;
+  sample.hand_open = hands.values(row, channel);
+}
+
+void SetWrench(const ScalarSeries& wrench, Eigen::Index row, EndEffectorSample& sample) {
+  sample.has_wrench = true;
+  for (Eigen::Index k = 0; k < std::min<Eigen::Index>(6, wrench.values.cols()); ++k) {
+    sample.wrench[static_cast<std::size_t>(k)] = wrench.values(row, k);
+  }
+}
+
+void SetLabel(const ScalarSeries& label, Eigen::Index row, EndEffectorSample& sample) {
+  sample.has_label = true;
+  sample.label = static_cast<std::int32_t>(std::lround(label.values(row, 0)));
 }
 
 }  // namespace
@@ -79,11 +119,12 @@ TrialSamples SamplesOf(const demonstration::Trial& trial, Stamp start,
     }
   }
 
+  Poseless poseless;
   RowsByTime wrench(trial.wrench);
   RowsByTime label(trial.label);
+  std::vector<RowsByTime> openings(trial.hands.names.size(), RowsByTime(trial.hands));
   for (std::size_t h = 0; h < trial.end_effectors.size(); ++h) {
     const PoseSeries& hand = trial.end_effectors[h];
-    RowsByTime opening(trial.hands);
     const std::optional<Eigen::Index> channel = ChannelOf(trial.hands, hand.name);
     for (std::size_t i = 0; i < hand.size(); ++i) {
       EndEffectorSample sample;
@@ -92,29 +133,32 @@ TrialSamples SamplesOf(const demonstration::Trial& trial, Stamp start,
       sample.base_T_tool = hand.base_T_frame[i];
       sample.has_orientation = hand.has_orientation;
       if (channel) {
-        if (const auto row = opening.At(hand.time_s[i])) {
-          sample.has_hand_open = true;
-          sample.hand_open = trial.hands.values(*row, *channel);
-        }
+        const auto row = openings[static_cast<std::size_t>(*channel)].At(hand.time_s[i]);
+        if (row) SetOpening(trial.hands, *row, *channel, sample);
       }
       if (h == 0) {
-        if (const auto row = wrench.At(hand.time_s[i])) {
-          sample.has_wrench = true;
-          for (Eigen::Index k = 0; k < std::min<Eigen::Index>(6, trial.wrench.values.cols()); ++k) {
-            sample.wrench[static_cast<std::size_t>(k)] = trial.wrench.values(*row, k);
-          }
-        }
-        if (const auto row = label.At(hand.time_s[i])) {
-          sample.has_label = true;
-          sample.label = static_cast<std::int32_t>(std::lround(trial.label.values(*row, 0)));
-        }
+        if (const auto row = wrench.At(hand.time_s[i])) SetWrench(trial.wrench, *row, sample);
+        if (const auto row = label.At(hand.time_s[i])) SetLabel(trial.label, *row, sample);
       }
       out.samples.emplace_back(std::move(sample));
     }
-    if (channel) NoticeUnused(opening, "hand opening", out);
   }
-  NoticeUnused(wrench, "wrench", out);
-  NoticeUnused(label, "label", out);
+  const std::string first_hand = trial.end_effectors.empty() ? "" : trial.end_effectors[0].name;
+  for (const std::size_t row : wrench.TakeUnused()) {
+    SetWrench(trial.wrench, static_cast<Eigen::Index>(row),
+              poseless.At(first_hand, trial.wrench.time_s[row]));
+  }
+  for (const std::size_t row : label.TakeUnused()) {
+    SetLabel(trial.label, static_cast<Eigen::Index>(row),
+             poseless.At(first_hand, trial.label.time_s[row]));
+  }
+  for (std::size_t c = 0; c < openings.size(); ++c) {
+    for (const std::size_t row : openings[c].TakeUnused()) {
+      SetOpening(trial.hands, static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c),
+                 poseless.At(trial.hands.names[c], trial.hands.time_s[row]));
+    }
+  }
+  poseless.MoveTo(out.samples, stamp);
 
   std::stable_sort(
       out.samples.begin(), out.samples.end(),

@@ -10,6 +10,7 @@
 #include "exemplar/base/log.hpp"
 #include "exemplar/base/result.hpp"
 #include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/raw_writer.hpp"
 
 namespace exemplar::bus {
 
@@ -22,6 +23,13 @@ struct ParticipantOptions {
   /// IPv4 addresses where other participants are sought beside multicast. The own machine is always
   /// sought, so that a loopback interface without multicast will do.
   std::vector<std::string> peers = {};
+  /// "HOST:PORT" of Fast DDS discovery servers, the first with the id 0, the next 1, and so on. With
+  /// one, nobody is sought by multicast: for networks that do not carry it.
+  std::vector<std::string> discovery_servers = {};
+  /// Topics that this program writes and reads best effort though the table has them reliable: where
+  /// only the newest sample counts ("ircp/joint_state"). Its writers and readers must agree; taps
+  /// read both.
+  std::vector<std::string> best_effort_topics = {};
   /// Shared memory for neighbours on the same machine, at most this much of it (less where
   /// /dev/shm is small); 0: UDP only. Holds a few stereo pairs.
   std::size_t shared_memory_bytes = std::size_t{16} << 20;
@@ -36,7 +44,7 @@ struct ParticipantOptions {
 /// reader never at once; a callback must not destroy its own reader.
 ///
 /// Writers of reliable topics wait up to 2 s on destruction until what they wrote has arrived.
-class Participant : public ircp::Bus, public ircp::RawBus {
+class Participant : public ircp::Bus, public ircp::RawBus, public ircp::RawOutlet {
  public:
   static Result<std::unique_ptr<Participant>> Create(ParticipantOptions options);
 };

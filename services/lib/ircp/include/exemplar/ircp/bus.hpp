@@ -45,6 +45,8 @@ class Reader {
   virtual ~Reader() = default;
   virtual int matched_writers() const = 0;
   virtual std::vector<SourceCount> counts() const = 0;
+  /// Samples that were malformed and did not reach the callback.
+  virtual std::uint64_t refused() const { return 0; }
 };
 
 /// Called on a thread of the network: copy and return.
@@ -106,6 +108,8 @@ struct RawTopic {
   std::string partition;
   bool keyed = false;
   bool reliable = false;
+  bool transient_local = false;
+  Duration deadline{0};  ///< that the writer offers; 0: none
 };
 
 struct RawSample {

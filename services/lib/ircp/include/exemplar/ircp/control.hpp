@@ -21,7 +21,8 @@ struct Answer {
 
 /// The answering side: de-duplicates by request id (the last 256 answers are kept and given again),
 /// drops commands older than their validity (judged from reception on the steady clock), publishes
-/// status on change and every second, with the counts of `sent`. Thread-safe.
+/// status on change and every second, with the counts of `sent`; answers questions about its clock
+/// (clock_watch.hpp). Thread-safe.
 class ControlServer {
  public:
   using Handler = std::function<Answer(const CommandSample&)>;  ///< on a thread of the server's own

@@ -226,4 +226,7 @@ class MemoryBus final : public BusOf<MemoryBus> {
   const std::shared_ptr<Network> network_ = std::make_shared<Network>();
 };
 
+// Compiled once, in memory_bus.cpp: eleven sample types take a compiler 15 s.
+extern template class BusOf<MemoryBus>;
+
 }  // namespace exemplar::ircp

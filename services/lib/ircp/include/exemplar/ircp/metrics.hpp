@@ -18,8 +18,8 @@ struct TopicReader {
   const Reader* reader;  ///< null: nothing is read yet
 };
 
-/// "<prefix>_received_total" and "<prefix>_lost_total" by topic and source. The readers outlive
-/// them.
+/// "<prefix>_received_total" and "<prefix>_lost_total" by topic and source,
+/// "<prefix>_refused_total" by topic. The readers outlive them.
 std::vector<Metric> ReceivedMetrics(const std::string& prefix, std::vector<TopicReader> readers);
 
 /// "<prefix>_state": 1 for the state that `current` names, 0 for the others.

@@ -33,7 +33,8 @@ struct SuitSample {
 struct EndEffectorSample {
   static constexpr const char* kTopic = "ircp/end_effector";
   Header header;
-  std::string hand;  ///< "" for the only hand
+  std::string hand;      ///< "" for the only hand
+  bool has_pose = true;  ///< false: only the other parts were measured at this time
   geometry::Pose base_T_tool;
   bool has_orientation = true;
   bool has_hand_open = false;

@@ -16,8 +16,8 @@ namespace exemplar::ircp {
 /// Gathers one trial's samples, in any order. Joints come from ircp/suit and touch from
 /// ircp/tactile. Only where the recording holds neither a suit nor a tool pose was a robot itself
 /// the demonstrator: then joints, and touch if there is no other, come from ircp/joint_state (else
-/// the robot merely stood by). Hands and objects keep the order in which they were first seen.
-/// Thread-compatible.
+/// the robot merely stood by). Beside a suit, ircp/joint_state gives the measured joints. Hands and
+/// objects keep the order in which they were first seen. Thread-compatible.
 class TrialBuilder {
  public:
   void Add(const SuitSample& sample);

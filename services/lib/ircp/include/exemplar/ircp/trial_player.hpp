@@ -16,11 +16,10 @@ using TrialSample = std::variant<SuitSample, EndEffectorSample, TactileSample, O
 struct TrialSamples {
   /// In order of header.stamp; sources and sequence numbers are left to the writers.
   std::vector<TrialSample> samples;
-  /// What no topic carries: hand opening, wrench or labels at times without a tool pose.
-  std::vector<std::string> notices;
 };
 
-/// Every sample of every stream, stamped `start` + time_s to the nanosecond.
+/// Every sample of every stream, stamped `start` + time_s to the nanosecond; hand opening, wrench
+/// and labels at times without a tool pose go out as end effector samples without one.
 /// TrialBuilder makes the same trial of them again. Objects are in frame `base_frame`.
 TrialSamples SamplesOf(const demonstration::Trial& trial, Stamp start,
                        const std::string& base_frame = "base");

@@ -1,6 +1,6 @@
-#include "recorder/sample_header.hpp"
+#include "exemplar/ircp/sample_header.hpp"
 
-namespace exemplar::recorder {
+namespace exemplar::ircp {
 namespace {
 
 constexpr std::size_t kEncapsulation = 4;
@@ -81,31 +81,73 @@ std::optional<HeaderLayout> ReadHeaderLayout(std::string_view idl, std::string_v
   return std::nullopt;
 }
 
+namespace {
+
+/// Steps through the beginning of a sample's CDR bytes.
+class HeaderReader {
+ public:
+  explicit HeaderReader(std::span<const std::uint8_t> cdr) {
+    // The second byte is 0 for big-endian and 1 for little-endian plain CDR; others are not ours.
+    if (cdr.size() < kEncapsulation || cdr[0] != 0 || cdr[1] > 1) return;
+    little_endian_ = cdr[1] == 1;
+    body_ = cdr.subspan(kEncapsulation);
+  }
+
+  std::optional<std::string_view> String() {
+    const std::optional<std::uint64_t> length = Number(4);  // with its zero
+    if (!length || *length == 0 || *length > body_.size() - at_) return std::nullopt;
+    const std::string_view text(reinterpret_cast<const char*>(body_.data() + at_),
+                                static_cast<std::size_t>(*length) - 1);
+    at_ += static_cast<std::size_t>(*length);
+    return text;
+  }
+  std::optional<std::uint64_t> Number(std::size_t size) {
+    at_ = (at_ + size - 1) / size * size;
+    if (at_ + size > body_.size()) return std::nullopt;
+    const std::uint64_t value = ReadNumber(body_.subspan(at_, size), little_endian_);
+    at_ += size;
+    return value;
+  }
+
+ private:
+  std::span<const std::uint8_t> body_;
+  bool little_endian_ = true;
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
 std::optional<SampleHeader> ReadSampleHeader(std::span<const std::uint8_t> cdr,
                                              HeaderLayout layout) {
-  if (cdr.size() < kEncapsulation) return std::nullopt;
-  // The second byte is 0 for big-endian and 1 for little-endian plain CDR; others are not ours.
-  if (cdr[0] != 0 || cdr[1] > 1) return std::nullopt;
-  const bool little_endian = cdr[1] == 1;
-  const std::span<const std::uint8_t> body = cdr.subspan(kEncapsulation);
+  HeaderReader reader(cdr);
   SampleHeader header;
-  std::size_t at = 0;
   for (int key = 0; key < layout.keys; ++key) {
-    at = (at + 3) / 4 * 4;
-    if (at + 4 > body.size()) return std::nullopt;
-    const std::uint64_t length = ReadNumber(body.subspan(at, 4), little_endian);  // with its zero
-    at += 4;
-    if (length == 0 || length > body.size() - at) return std::nullopt;
-    if (key == 0) {
-      const auto text = body.subspan(at, static_cast<std::size_t>(length) - 1);
-      header.source.assign(text.begin(), text.end());
-    }
-    at += static_cast<std::size_t>(length);
+    const std::optional<std::string_view> text = reader.String();
+    if (!text) return std::nullopt;
+    if (key == 0) header.source = *text;
   }
-  at = (at + 7) / 8 * 8;
-  if (at + 8 > body.size()) return std::nullopt;
-  header.seq = ReadNumber(body.subspan(at, 8), little_endian);
+  const std::optional<std::uint64_t> seq = reader.Number(8);
+  if (!seq) return std::nullopt;
+  header.seq = *seq;
   return header;
 }
 
-}  // namespace exemplar::recorder
+std::optional<std::vector<std::uint8_t>> ReadSampleKeys(std::span<const std::uint8_t> cdr,
+                                                        HeaderLayout layout) {
+  HeaderReader reader(cdr);
+  std::vector<std::uint8_t> keys;
+  for (int key = 0; key < layout.keys; ++key) {
+    const std::optional<std::string_view> text = reader.String();
+    if (!text) return std::nullopt;
+    keys.resize((keys.size() + 3) / 4 * 4);
+    const std::size_t length = text->size() + 1;
+    for (int shift = 24; shift >= 0; shift -= 8) {
+      keys.push_back(static_cast<std::uint8_t>(length >> shift));
+    }
+    keys.insert(keys.end(), text->begin(), text->end());
+    keys.push_back(0);
+  }
+  return keys;
+}
+
+}  // namespace exemplar::ircp

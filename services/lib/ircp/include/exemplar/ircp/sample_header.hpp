@@ -4,8 +4,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
-namespace exemplar::recorder {
+namespace exemplar::ircp {
 
 /// What every type under exemplar::ircp begins with (idl/common.idl): its keys, of which `source`
 /// is the first and all are strings, and then `seq`.
@@ -27,4 +28,9 @@ std::optional<HeaderLayout> ReadHeaderLayout(std::string_view idl, std::string_v
 std::optional<SampleHeader> ReadSampleHeader(std::span<const std::uint8_t> cdr,
                                              HeaderLayout layout = {});
 
-}  // namespace exemplar::recorder
+/// The sample's keys as the network's key hash wants them before it hashes: strings in big-endian
+/// CDR. nullopt as above.
+std::optional<std::vector<std::uint8_t>> ReadSampleKeys(std::span<const std::uint8_t> cdr,
+                                                        HeaderLayout layout);
+
+}  // namespace exemplar::ircp
