@@ -138,6 +138,58 @@ TEST(Description, MeshPathsStartAtTheFile) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(Description, ReadsWhatTheRobotHoldsInItsLinksFrame) {
+  const Result<Description> read = ParseDescription(
+      "held:\n"
+      "  - {name: peg, link: hand, shape: cylinder, radius: 0.01, length: 0.1,\n"
+      "     position: [0, 0, 0.1], touch: [finger, palm]}\n"
+      "  - {name: plate, link: hand, shape: mesh, mesh: a.stl, convex: true, position: [0, 0, "
+      "0]}\n",
+      "scene.yaml");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->held.size(), 2u);
+  EXPECT_EQ(read->held[0].link, "hand");
+  EXPECT_EQ(read->held[0].link_T_shape.translation.z(), 0.1);
+  EXPECT_THAT(read->held[0].touch_links, ::testing::ElementsAre("finger", "palm"));
+  EXPECT_TRUE(std::get<kinematics::Mesh>(read->held[1].shape).convex);
+  EXPECT_THAT(ErrorOf("held:\n  - {name: a, shape: sphere, radius: 1, position: [0, 0, 0]}\n"),
+              AllOf(HasSubstr("held[0].link"), HasSubstr("missing")));
+  EXPECT_THAT(
+      ErrorOf("held:\n  - {name: a, link: b, shape: sphere, radius: 1, position: [0, 0, 0],\n"
+              "     touch: [[c]]}\n"),
+      AllOf(HasSubstr("scene.yaml:3"), HasSubstr("held[0].touch[0]")));
+  EXPECT_THAT(ErrorOf("obstacles:\n  - {name: a, shape: mesh, mesh: b.stl, convex: maybe, "
+                      "position: [0, 0, 0]}\n"),
+              AllOf(HasSubstr("obstacles[0].convex"), HasSubstr("true or false")));
+}
+
+TEST(Description, ReadsPointCloudsFromTheirFiles) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / "exemplar_cloud_test";
+  std::filesystem::create_directories(folder);
+  const auto read_with = [&](const std::string& points) {
+    std::ofstream(folder / "shelf.xyz") << points;
+    std::ofstream(folder / "scene.yaml")
+        << "clouds:\n  - {name: shelf, file: shelf.xyz, resolution: 0.01, position: [1, 0, 0]}\n";
+    return ReadDescription(folder / "scene.yaml");
+  };
+  const Result<Description> read = read_with("# seen\n0 0 1\n\n  0.5   -1e-1 2 255 0 0\r\n");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->clouds.size(), 1u);
+  EXPECT_EQ(read->clouds[0].resolution_m, 0.01);
+  ASSERT_EQ(read->clouds[0].cloud_p_points.size(), 2u);
+  EXPECT_EQ(read->clouds[0].cloud_p_points[1], Eigen::Vector3d(0.5, -0.1, 2));
+  for (const char* wrong : {"0 0 1\n0 0\n", "0 0 1\n0 x 0\n", "0 0 1\n0 nan 0\n"}) {
+    EXPECT_THAT(read_with(wrong).error().message,
+                AllOf(HasSubstr("scene.yaml:2"), HasSubstr("shelf.xyz:2")));
+  }
+  EXPECT_THAT(read_with("# nothing\n").error().message, HasSubstr("no points"));
+  std::filesystem::remove(folder / "shelf.xyz");
+  EXPECT_THAT(ReadDescription(folder / "scene.yaml").error().message,
+              AllOf(HasSubstr("clouds[0].file"), HasSubstr("cannot be read")));
+  std::filesystem::remove_all(folder);
+}
+
 TEST(Description, AMissingFileIsNotFound) {
   const Result<Description> read = ReadDescription("/nowhere/scene.yaml");
   ASSERT_FALSE(read.ok());

@@ -33,6 +33,9 @@ class SrdfReader {
     if (std::string_view(robot->Name()) != "robot") {
       return At(*robot, "the root element must be <robot>");
     }
+    if (const XMLElement* second = robot->NextSiblingElement()) {
+      return At(*second, "stands after the end of <robot>");
+    }
     const char* name = robot->Attribute("name");
     if (name == nullptr) return At(*robot, "name is missing");
     if (name != model_.name) {
