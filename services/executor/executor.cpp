@@ -58,8 +58,8 @@ Result<std::unique_ptr<Executor>> Executor::Create(ircp::Bus& bus, const Clock& 
   options.plan.touch_links = robot.touch_links;
   options.plan.comfortable = robot.home;
   // Meshes and shapes are looked at once now, so that a bad one shows before anything moves.
-  const Result<collision::CollisionChecker> checker =
-      collision::CollisionChecker::Create(robot.model, collision::MakeScene(scene));
+  const Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
+      robot.model, collision::MakeScene(scene), collision::OptionsOf(robot));
   if (!checker.ok()) return checker.error();
   std::unique_ptr<Executor> executor(
       new Executor(clock, log, skills, robot, scene, std::move(options)));
@@ -371,8 +371,8 @@ Result<Executor::Planned> Executor::TryPlan(const api::ExecuteRequest& request,
   const std::vector<geometry::NamedPose>& used =
       motion->objects.empty() ? *objects : motion->objects;
   placed.insert(placed.end(), used.begin(), used.end());
-  Result<collision::CollisionChecker> checker =
-      collision::CollisionChecker::Create(robot_.model, collision::MakeScene(scene_, placed));
+  Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
+      robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
   if (!checker.ok()) return checker.error();
   motion::PlanOptions options = options_.plan;
   options.speed_scale = request.speed;
