@@ -4,11 +4,19 @@
 
 namespace exemplar::motion {
 
+namespace {
+
+std::string Written(const Eigen::Vector3d& p) {
+  return "(" + FormatFixed(p.x(), 3) + ", " + FormatFixed(p.y(), 3) + ", " + FormatFixed(p.z(), 3) +
+         ")";
+}
+
+}  // namespace
+
 std::string DescribeViolation(const collision::Violation& violation, double required_clearance_m) {
   const collision::Clearance& c = violation.clearance;
-  const std::string where = " near (" + FormatFixed(c.base_p_second.x(), 3) + ", " +
-                            FormatFixed(c.base_p_second.y(), 3) + ", " +
-                            FormatFixed(c.base_p_second.z(), 3) + ") m";
+  const std::string where =
+      " near " + Written(c.base_p_first) + " and " + Written(c.base_p_second) + " m";
   const std::string pair = "\"" + c.first + "\" and \"" + c.second + "\"";
   const std::string when = "at " + FormatFixed(violation.s, 2) + " s ";
   if (c.distance_m < 0) {
