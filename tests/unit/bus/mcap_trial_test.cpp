@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "exemplar/bus/codec.hpp"
+#include "exemplar/ircp/clock_relation.hpp"
 #include "exemplar/ircp/trial_player.hpp"
 #include "exemplar/recording/writer.hpp"
 
@@ -26,7 +27,8 @@ class Recording {
   }
 
   void AddBytes(const std::string& topic, const std::string& type,
-                const std::vector<std::uint8_t>& bytes, const std::string& writer = "w1") {
+                const std::vector<std::uint8_t>& bytes, const std::string& writer = "w1",
+                Stamp received = Stamp()) {
     auto [known, added] = channels_.try_emplace({topic, writer}, next_);
     if (added) {
       recording::Schema schema{next_, type, "omgidl", {'x'}};
@@ -37,6 +39,7 @@ class Recording {
     }
     recording::Message message;
     message.channel_id = known->second;
+    message.log_time = received;
     message.data = bytes;
     ASSERT_TRUE(writer_->Write(message).ok());
   }
@@ -117,6 +120,17 @@ TEST(ReadTrialFromMcapTest, CountsLossesAndDropsWhatStandsTwice) {
   EXPECT_THAT(read->notices, Contains("ircp/end_effector: 2 samples stood twice"));
 }
 
+TEST(ReadTrialFromMcapTest, TellsTheLabelsThatWereWrittenLast) {
+  Recording recording;
+  recording.Add(Tool(1), 1);
+  recording.Add(Tool(2), 2);
+  recording.AddMetadata({"exemplar.labels", {{"success", "no"}, {"phase", "press"}}});
+  recording.AddMetadata({"exemplar.labels", {{"success", "yes"}}});
+  const auto read = ReadTrialFromMcap(recording.Bytes(), "t.mcap");
+  ASSERT_TRUE(read.ok());
+  EXPECT_EQ(read->notices, std::vector<std::string>{"label success: yes"});
+}
+
 TEST(ReadTrialFromMcapTest, KeepsSamplesOfAWriterThatWasStartedAgain) {
   Recording recording;
   recording.Add(Tool(1), 1, "w1");
@@ -170,6 +184,55 @@ TEST(ReadTrialFromMcapTest, RefusesWhatIsNoWholeRecording) {
   Recording nothing;
   nothing.AddBytes("rt/scan", "x", {1});
   EXPECT_FALSE(ReadTrialFromMcap(nothing.Bytes(), "nothing.mcap").ok());
+}
+
+TEST(ReadTrialFromMcapTest, BringsTheStampsOfAnotherMachinesClockOntoTheRecorders) {
+  const Stamp start = Stamp::FromNanoseconds(1'700'000'000'000'000'000);
+  Recording recording;
+  // The suit's machine is 7 s ahead and gains 100 parts in a million; the camera's is the
+  // recorder's.
+  const auto shown = [&](double t) { return start + FromSeconds(t + 7 + 1e-4 * t); };
+  for (int i = 0; i < 50; ++i) {
+    const double t = 0.1 * i;
+    ircp::EndEffectorSample tool;
+    tool.header = {.source = "suit", .seq = static_cast<std::uint64_t>(i + 1), .stamp = shown(t)};
+    recording.AddBytes("ircp/end_effector", std::string(TypeNameOf<ircp::EndEffectorSample>()),
+                       Encode(tool), "aa|1", start + FromSeconds(t + 0.002));
+    ircp::ObjectSample object;
+    object.header = {.source = "camera",
+                     .seq = static_cast<std::uint64_t>(i + 1),
+                     .stamp = start + FromSeconds(t)};
+    object.name = "button";
+    recording.AddBytes("ircp/objects", std::string(TypeNameOf<ircp::ObjectSample>()),
+                       Encode(object), "bb|1", start + FromSeconds(t + 0.002));
+  }
+  for (const double t : {0.0, 5.0}) {
+    recording.AddMetadata(
+        {"exemplar.clock", ircp::ToFields({.participant = "aa",
+                                           .program = "capture_suit",
+                                           .observer = "cc",
+                                           .at = start + FromSeconds(t),
+                                           .offset = shown(t) - (start + FromSeconds(t)),
+                                           .drift = 1e-4,
+                                           .uncertainty = std::chrono::microseconds(100),
+                                           .since = start})});
+    recording.AddMetadata(
+        {"exemplar.clock", ircp::ToFields({.participant = "bb",
+                                           .program = "capture_vision",
+                                           .observer = "cc",
+                                           .at = start + FromSeconds(t),
+                                           .offset = std::chrono::microseconds(80),
+                                           .uncertainty = std::chrono::microseconds(100),
+                                           .since = start})});
+  }
+  const auto trial = ReadTrialFromMcap(recording.Bytes(), "t.mcap");
+  ASSERT_TRUE(trial.ok()) << trial.error().message;
+  const std::vector<double>& tool_s = trial->end_effectors.at(0).time_s;
+  const std::vector<double>& button_s = trial->objects.at(0).time_s;
+  ASSERT_EQ(tool_s.size(), 50U);
+  ASSERT_EQ(button_s.size(), 50U);
+  for (std::size_t i = 0; i < 50; ++i) EXPECT_NEAR(tool_s[i], button_s[i], 1e-6);
+  EXPECT_THAT(trial->notices, Contains(HasSubstr("clock of capture_suit: 7.0005")));
 }
 
 }  // namespace

@@ -67,6 +67,11 @@ inline void Fill(Rng& rng, ircp::EndEffectorSample& s) {
   if (Coin(rng)) s.hand = RandomText(rng);
   s.base_T_tool = RandomPose(rng);
   s.has_orientation = Coin(rng);
+  s.has_pose = Coin(rng);
+  if (!s.has_pose) {
+    s.base_T_tool = {};
+    s.has_orientation = false;
+  }
   s.has_hand_open = Coin(rng);
   s.hand_open = rng.Uniform();
   s.has_wrench = Coin(rng);
@@ -173,8 +178,9 @@ inline auto Members(const ircp::SuitSample& s) {
   return std::tuple(Members(s.header), s.names, s.positions);
 }
 inline auto Members(const ircp::EndEffectorSample& s) {
-  return std::tuple(Members(s.header), s.hand, Members(s.base_T_tool), s.has_orientation,
-                    s.has_hand_open, s.hand_open, s.has_wrench, s.wrench, s.has_label, s.label);
+  return std::tuple(Members(s.header), s.hand, s.has_pose, Members(s.base_T_tool),
+                    s.has_orientation, s.has_hand_open, s.hand_open, s.has_wrench, s.wrench,
+                    s.has_label, s.label);
 }
 inline auto Members(const ircp::TactileSample& s) {
   return std::tuple(Members(s.header), s.sensors, s.forces_n);
