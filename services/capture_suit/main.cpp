@@ -47,11 +47,16 @@ int main(int argc, char** argv) {
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "capture-suit");
   const SystemClock clock;
-  auto participant = bus::Participant::Create({.domain = options.common().domain,
-                                               .station = options.common().station,
-                                               .name = kName,
-                                               .clock = &clock,
-                                               .log = log.get()});
+  auto participant =
+      bus::Participant::Create({.domain = options.common().domain,
+                                .station = options.common().station,
+                                .name = kName,
+                                .interfaces = options.common().interfaces,
+                                .peers = options.common().peers,
+                                .discovery_servers = options.common().discovery_servers,
+                                .best_effort_topics = options.common().best_effort,
+                                .clock = &clock,
+                                .log = log.get()});
   if (!participant) return program::Fail(kName, participant.error());
   const auto session = capture_suit::MakeSession(**participant, clock, *log, what);
   if (!session) return program::Fail(kName, session.error());

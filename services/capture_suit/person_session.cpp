@@ -14,7 +14,6 @@ constexpr const char* kSource = "suit";
 constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
-constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(5);
 constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
 constexpr double kWayToStart = 1.0;                                     // s
 constexpr double kBeyondTravel = 0.003;  // m, as one presses who wants to feel the stop

@@ -14,7 +14,6 @@ namespace {
 
 constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
-constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(5);
 
 }  // namespace
 
@@ -87,7 +86,6 @@ Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
   }
   control_->SetState("playing", trial.source);
   const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);
-  for (const std::string& notice : samples.notices) log_.Warning(trial.source + ": " + notice);
   Status played = streams_.Play(samples, options_.rate, clock_, stop);
   if (played && !streams_.WaitForAcknowledgments(kAcknowledgeTimeout, clock_, stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", trial.source}});

@@ -8,6 +8,11 @@
 
 namespace exemplar::capture_suit {
 
+/// What is waited for at a trial's end until every reader has all of it. Longer than a silent
+/// reader takes to count as gone (docs/topics.md), so that a link that is cut across the end loses
+/// nothing.
+inline constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(45);
+
 /// Trials, one after the other, onto the topics. Run on one thread; the rest is thread-safe.
 class Session {
  public:

@@ -110,6 +110,12 @@ Options::Options(std::string program, std::string summary, std::string footer, R
   if (roles.bus) {
     app.add_option("--domain", common.domain, "DDS domain")->check(CLI::Range(0, 232));
     app.add_option("--station", common.station, "name of the place; stations never mix");
+    app.add_option("--interface", common.interfaces, "network interfaces to use (default: all)");
+    app.add_option("--peer", common.peers, "machines to seek where multicast does not reach");
+    app.add_option("--discovery-server", common.discovery_servers,
+                   "HOST:PORT of Fast DDS discovery servers, used instead of multicast");
+    app.add_option("--best-effort", common.best_effort,
+                   "topics not sent again when lost (ircp/joint_state); all programs alike");
   }
   if (roles.server) {
     app.add_option("--listen", common.listen, "HOST:PORT of the gRPC server; port 0 picks one");

@@ -10,10 +10,14 @@ namespace exemplar::program {
 
 /// What most programs share (DESIGN.md, "Processes").
 struct CommonOptions {
-  int domain = 0;                      ///< DDS domain
-  std::string station = "default";     ///< name of the place; the DDS partition of its topics
-  std::string listen = "127.0.0.1:0";  ///< of the gRPC server; port 0 picks a free one
-  std::string port_file;               ///< gets the port that was picked
+  int domain = 0;                       ///< DDS domain
+  std::string station = "default";      ///< name of the place; the DDS partition of its topics
+  std::vector<std::string> interfaces;  ///< network interfaces to use; empty: all
+  std::vector<std::string> peers;       ///< machines sought beside multicast
+  std::vector<std::string> discovery_servers;  ///< HOST:PORT; with one, no multicast
+  std::vector<std::string> best_effort;        ///< topics that are not sent again when lost
+  std::string listen = "127.0.0.1:0";          ///< of the gRPC server; port 0 picks a free one
+  std::string port_file;                       ///< gets the port that was picked
   std::string data_dir;
   std::string metrics;  ///< HOST:PORT of the Prometheus endpoint; empty: none
   std::string log_format = "text";
@@ -22,7 +26,8 @@ struct CommonOptions {
 
 /// Which of the common options a program has.
 struct Roles {
-  bool bus = false;     ///< --domain, --station
+  bool bus = false;     ///< --domain, --station, --interface, --peer, --discovery-server,
+                        ///< --best-effort
   bool server = false;  ///< --listen, --port-file
   bool data = false;    ///< --data-dir
 };
