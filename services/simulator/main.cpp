@@ -43,11 +43,16 @@ int main(int argc, char** argv) {
   if (!robot) return program::Fail(kName, robot.error());
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene) return program::Fail(kName, scene.error());
-  auto participant = bus::Participant::Create({.domain = options.common().domain,
-                                               .station = options.common().station,
-                                               .name = kName,
-                                               .clock = &clock,
-                                               .log = log.get()});
+  auto participant =
+      bus::Participant::Create({.domain = options.common().domain,
+                                .station = options.common().station,
+                                .name = kName,
+                                .interfaces = options.common().interfaces,
+                                .peers = options.common().peers,
+                                .discovery_servers = options.common().discovery_servers,
+                                .best_effort_topics = options.common().best_effort,
+                                .clock = &clock,
+                                .log = log.get()});
   if (!participant) return program::Fail(kName, participant.error());
   auto session = simulator::Session::Create(**participant, clock, *log, *robot, *scene, settings);
   if (!session) return program::Fail(kName, session.error());
