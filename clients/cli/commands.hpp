@@ -14,5 +14,9 @@ void AddRobotCommands(Command& root, const Session& session);
 void AddRecordCommands(Command& root, const Session& session);
 /// `record info`, `record recover`: on files of this machine, without a server.
 void AddRecordingFileCommands(Command& record);
+/// `record join`.
+void AddJoinCommand(Command& record);
+/// `record replay`.
+void AddReplayCommand(Command& record);
 
 }  // namespace exemplar::cli

@@ -146,6 +146,8 @@ void AddRecordCommands(Command& root, const Session& session) {
     });
   }
   AddRecordingFileCommands(record);
+  AddJoinCommand(record);
+  AddReplayCommand(record);
 }
 
 }  // namespace exemplar::cli

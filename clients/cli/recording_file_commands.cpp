@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -5,6 +6,7 @@
 
 #include "commands.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/ircp/clock_relation.hpp"
 #include "exemplar/recording/append.hpp"
 #include "exemplar/recording/file.hpp"
 #include "exemplar/recording/reader.hpp"
@@ -16,6 +18,8 @@ namespace exemplar::cli {
 namespace {
 
 constexpr const char* kLabels = "exemplar.labels";
+constexpr const char* kLosses = "exemplar.losses";
+constexpr const char* kClock = "exemplar.clock";
 
 struct Words {
   std::string file, output, format;
@@ -27,14 +31,42 @@ struct TopicInfo {
   std::uint64_t messages = 0;
 };
 
+/// What a writer of a topic sent, and how much of it is missing why.
+struct LossInfo {
+  std::string topic, writer, source;
+  std::uint64_t received = 0;
+  std::uint64_t lost_in_gaps = 0;
+  std::uint64_t lost_at_end = 0;
+  std::uint64_t dropped = 0;
+};
+
 struct FileInfo {
   std::uint64_t bytes = 0;
   std::string library;
   recording::Statistics statistics;
   std::vector<TopicInfo> topics;
-  std::map<std::string, recording::StringMap> metadata;
+  std::map<std::string, recording::StringMap> metadata;  ///< the last of each name
+  std::vector<LossInfo> losses;
+  std::vector<ircp::ClockRelation> clocks;  ///< the last of each program
   std::vector<std::string> attachments;
 };
+
+LossInfo LossesFrom(const recording::StringMap& fields) {
+  const auto text = [&](const char* name) {
+    const auto found = fields.find(name);
+    return found == fields.end() ? std::string() : found->second;
+  };
+  const auto number = [&](const char* name) {
+    return static_cast<std::uint64_t>(std::max(0LL, ParseInteger(text(name)).value_or(0)));
+  };
+  return {.topic = text("topic"),
+          .writer = text("writer"),
+          .source = text("source"),
+          .received = number("received"),
+          .lost_in_gaps = number("lost_in_gaps"),
+          .lost_at_end = number("lost_at_end"),
+          .dropped = number("dropped_by_recorder")};
+}
 
 Result<FileInfo> ReadInfo(const std::string& path) {
   if (const Status whole = recording::FinishAppend(path); !whole) return whole.error();
@@ -66,11 +98,24 @@ Result<FileInfo> ReadInfo(const std::string& path) {
          .encoding = channel.message_encoding,
          .messages = count == info.statistics.channel_message_counts.end() ? 0 : count->second});
   }
+  std::map<std::pair<std::string, std::string>, LossInfo> losses;  // the last of a writer counts
+  std::map<std::string, ircp::ClockRelation> clocks;
   for (const recording::MetadataIndex& index : reader.metadata()) {
     const Result<recording::Metadata> metadata = reader.ReadMetadata(index);
     if (!metadata) return WithPlace(metadata.error(), path);
-    info.metadata[metadata->name] = metadata->metadata;
+    if (metadata->name == kLosses) {
+      LossInfo of_writer = LossesFrom(metadata->metadata);
+      losses[{of_writer.topic, of_writer.writer}] = std::move(of_writer);
+    } else if (metadata->name == kClock) {
+      const auto relation = ircp::ClockRelationFromFields(metadata->metadata);
+      if (!relation) return WithPlace(relation.error(), path + ": metadata " + kClock);
+      clocks[relation->participant] = *relation;
+    } else {
+      info.metadata[metadata->name] = metadata->metadata;
+    }
   }
+  for (auto& entry : losses) info.losses.push_back(std::move(entry.second));
+  for (auto& entry : clocks) info.clocks.push_back(std::move(entry.second));
   for (const recording::AttachmentIndex& index : reader.attachments()) {
     info.attachments.push_back(index.name);
   }
@@ -93,6 +138,26 @@ int Info(const Words& words) {
                         {"encoding", topic.encoding},
                         {"messages", topic.messages}});
     }
+    nlohmann::json losses = nlohmann::json::array();
+    for (const LossInfo& of_writer : info->losses) {
+      losses.push_back({{"topic", of_writer.topic},
+                        {"source", of_writer.source},
+                        {"writer", of_writer.writer},
+                        {"received", of_writer.received},
+                        {"lost_in_gaps", of_writer.lost_in_gaps},
+                        {"lost_at_end", of_writer.lost_at_end},
+                        {"dropped_by_recorder", of_writer.dropped}});
+    }
+    nlohmann::json clocks = nlohmann::json::array();
+    for (const ircp::ClockRelation& clock : info->clocks) {
+      clocks.push_back({{"program", clock.program},
+                        {"participant", clock.participant},
+                        {"offset_s", ToSeconds(clock.offset)},
+                        {"drift_ppm", 1e6 * clock.drift},
+                        {"uncertainty_s", ToSeconds(clock.uncertainty)},
+                        {"exchanges", clock.exchanges},
+                        {"jumps", clock.epoch}});
+    }
     Print({{"file", words.file},
            {"bytes", info->bytes},
            {"library", info->library},
@@ -101,6 +166,8 @@ int Info(const Words& words) {
            {"messages", statistics.message_count},
            {"chunks", statistics.chunk_count},
            {"topics", std::move(topics)},
+           {"losses", std::move(losses)},
+           {"clocks", std::move(clocks)},
            {"metadata", info->metadata},
            {"attachments", info->attachments}});
     return 0;
@@ -115,6 +182,25 @@ int Info(const Words& words) {
     topics.Add({topic.topic, std::to_string(topic.messages), topic.type, topic.encoding});
   }
   std::cout << topics.Text();
+  if (!info->losses.empty()) {
+    Table losses({"TOPIC", "SOURCE", "RECEIVED", "IN GAPS", "AT END", "BY RECORDER", "WRITER"});
+    for (const LossInfo& of_writer : info->losses) {
+      losses.Add({of_writer.topic, of_writer.source, std::to_string(of_writer.received),
+                  std::to_string(of_writer.lost_in_gaps), std::to_string(of_writer.lost_at_end),
+                  std::to_string(of_writer.dropped), of_writer.writer});
+    }
+    std::cout << "lost\n" << losses.Text(2);
+  }
+  if (!info->clocks.empty()) {
+    Table clocks(
+        {"PROGRAM", "AHEAD S", "WITHIN S", "DRIFT PPM", "EXCHANGES", "JUMPS", "PARTICIPANT"});
+    for (const ircp::ClockRelation& clock : info->clocks) {
+      clocks.Add({clock.program, FormatFixed(ToSeconds(clock.offset), 6),
+                  FormatFixed(ToSeconds(clock.uncertainty), 6), FormatFixed(1e6 * clock.drift, 1),
+                  std::to_string(clock.exchanges), std::to_string(clock.epoch), clock.participant});
+    }
+    std::cout << "clocks beside the recorder's\n" << clocks.Text(2);
+  }
   for (const auto& [name, entries] : info->metadata) {
     std::cout << "metadata " << name << '\n';
     for (const auto& [key, value] : entries) std::cout << "  " << key << " = " << value << '\n';
@@ -158,7 +244,11 @@ int Recover(const Words& words) {
   if (!source) return Fail(source.error());
   const auto sink = recording::FileSink::Create(output);
   if (!sink) return Fail(sink.error());
-  const Result<recording::RecoveryReport> report = recording::Recover(**source, **sink);
+  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
+  auto scratch = recording::FileScratch::Create(folder);
+  if (!scratch) return Fail(scratch.error());
+  const Result<recording::RecoveryReport> report =
+      recording::Recover(**source, **sink, {}, std::move(*scratch));
   if (!report) {
     std::error_code ignored;
     std::filesystem::remove(output, ignored);
