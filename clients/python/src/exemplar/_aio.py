@@ -1,0 +1,185 @@
+"""Carries calls out under asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Any, Generic, TypeVar
+
+import grpc
+import grpc.aio
+
+from . import _calls
+from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings
+from ._errors import CancelledError, from_rpc
+from ._pose import Objects, PoseLike
+from ._values import Motion
+from ._wire import Message, Method
+
+T = TypeVar("T")
+P = TypeVar("P")
+
+
+class AsyncOperation(Generic[P, T]):
+    """A call that takes long: iterate over it for what is known on the way, then await its result.
+
+    async for progress in (learning := client.skills.learn("press")):
+        print(progress.step)
+    report = await learning.result()
+
+    It runs from the moment it is made. It is cancelled by cancel(), at the end of an `async with` block, and with the task that
+    waits for it.
+    """
+
+    def __init__(self, call: _calls.Long[P, T], stream: Any, address: str) -> None:
+        self._outcome = Outcome(call)
+        self._stream = stream
+        self._address = address
+        self._cancelled = False
+
+    def __aiter__(self) -> AsyncIterator[P]:
+        return self
+
+    async def __anext__(self) -> P:
+        if self._outcome.ended:
+            raise StopAsyncIteration
+        try:
+            message = await self._stream.read()
+            if message is not grpc.aio.EOF:
+                progress = self._outcome.take(message)
+                if progress is not None:
+                    return progress
+                await self._stream.read()
+        except grpc.aio.AioRpcError as error:
+            raise self._outcome.fail(from_rpc(error, self._address)) from None
+        except asyncio.CancelledError:
+            # gRPC raises the same for a call that was cancelled as asyncio does for the task that waits.
+            if not self._cancelled or _task_is_cancelled():
+                raise
+            message = f"the call to {self._address} was cancelled"
+            raise self._outcome.fail(CancelledError(message)) from None
+        self._outcome.finish()
+        raise StopAsyncIteration
+
+    async def result(self) -> T:
+        """Waits for the end. Raises what the service refused or what broke the call."""
+        async for _ in self:
+            pass
+        return self._outcome.value()
+
+    def cancel(self) -> None:
+        """Ends the call; iterating over it and its result raise CancelledError."""
+        self._cancelled = True
+        self._stream.cancel()
+
+    async def __aenter__(self) -> AsyncOperation[P, T]:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if not self._outcome.ended:
+            self.cancel()
+
+
+class AsyncMotionStream:
+    """One skill, asked again and again as its objects move: a question costs less than a call.
+
+    Several tasks may ask; a task that is cancelled while it asks ends the stream.
+    """
+
+    def __init__(self, questions: QueryStream, link: AsyncLink, timeout: float | None) -> None:
+        self._questions = questions
+        self._address = link.settings.address(questions.method)
+        self._lock = asyncio.Lock()
+        open_stream = link.channel(questions.method).stream_stream(questions.method.path, **questions.method.codec())
+        self._stream = open_stream(timeout=_calls.limit_s(None, timeout, long=True), metadata=link.settings.metadata())
+
+    async def query(
+        self,
+        objects: Objects,
+        *,
+        start: PoseLike | None = None,
+        joint_start: _calls.JointStart | None = None,
+    ) -> Motion:
+        """As `client.skills.query`. An error of the question leaves the stream open; one of the connection ends it."""
+        async with self._lock:
+            request = self._questions.request(objects, start, joint_start)
+            try:
+                await self._stream.write(request)
+                while (answer := await self._stream.read()) is not grpc.aio.EOF:
+                    if self._questions.answers(answer):
+                        return self._questions.read(answer)
+            except grpc.aio.AioRpcError as error:
+                raise from_rpc(error, self._address) from None
+            except asyncio.InvalidStateError:
+                pass  # a stream that has ended cannot be written to
+        raise self._questions.ended(self._address)
+
+    async def close(self) -> None:
+        """Ends the stream."""
+        self._stream.cancel()
+
+    async def __aenter__(self) -> AsyncMotionStream:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+
+class AsyncLink:
+    """Channels to the services, one an address, opened when first used. Belongs to one event loop."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._channels: dict[str, grpc.aio.Channel] = {}
+
+    def channel(self, method: Method) -> Any:
+        """The channel to who serves a method."""
+        address = self.settings.address(method)
+        if address not in self._channels:
+            self._channels[address] = grpc.aio.insecure_channel(address, options=CHANNEL_OPTIONS)
+        return self._channels[address]
+
+    async def close(self) -> None:
+        """Ends all calls."""
+        channels, self._channels = self._channels, {}
+        for channel in channels.values():
+            await channel.close()
+
+    async def unary(self, call: _calls.Unary[T], timeout: float | None = None) -> T:
+        """Answers."""
+        invoke = self.channel(call.method).unary_unary(call.method.path, **call.method.codec())
+        return call.read(await self._wait(call.method, invoke, call.request, timeout, call.long))
+
+    async def upload(self, call: _calls.Upload[T], timeout: float | None = None) -> T:
+        """Answers once the file is sent."""
+        invoke = self.channel(call.method).stream_unary(call.method.path, **call.method.codec())
+        return call.read(await self._wait(call.method, invoke, call.requests(), timeout, False))
+
+    async def download(self, call: _calls.Download, timeout: float | None = None) -> bytes:
+        """The file's bytes."""
+        stream = self._open(call.method, call.request, _calls.limit_s(self.settings.timeout, timeout, False))
+        try:
+            return b"".join([part.chunk.data async for part in stream])
+        except grpc.aio.AioRpcError as error:
+            raise from_rpc(error, self.settings.address(call.method)) from None
+
+    def long(self, call: _calls.Long[P, T], timeout: float | None = None) -> AsyncOperation[P, T]:
+        """Begins."""
+        stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
+        return AsyncOperation(call, stream, self.settings.address(call.method))
+
+    def _open(self, method: Method, request: Message, limit_s: float | None) -> Any:
+        invoke = self.channel(method).unary_stream(method.path, **method.codec())
+        return invoke(request, timeout=limit_s, metadata=self.settings.metadata())
+
+    async def _wait(self, method: Method, invoke: Any, request: Any, timeout: float | None, long: bool) -> Message:
+        limit_s = _calls.limit_s(self.settings.timeout, timeout, long)
+        try:
+            return await invoke(request, timeout=limit_s, metadata=self.settings.metadata())
+        except grpc.aio.AioRpcError as error:
+            raise from_rpc(error, self.settings.address(method)) from None
+
+
+def _task_is_cancelled() -> bool:
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0

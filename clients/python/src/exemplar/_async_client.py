@@ -1,0 +1,369 @@
+"""The client for asyncio: Client call by call, with the same names, parameters and values."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+
+from . import _calls
+from ._aio import AsyncLink, AsyncMotionStream, AsyncOperation
+from ._calls import JointStart, Options, TrialFile
+from ._connection import QueryStream, Settings
+from ._pose import Objects, PoseLike
+from ._trial import Trial
+from ._values import (
+    Evaluation,
+    ExecutionResult,
+    Feedback,
+    Motion,
+    Plan,
+    Progress,
+    RecorderStatus,
+    RobotStatus,
+    Segmentation,
+    SkillInfo,
+    SkillReport,
+    SkillVersion,
+    Submission,
+    Suggestions,
+    TrialInfo,
+)
+
+
+class AsyncClient:
+    """All services of a system.
+
+    server: HOST:PORT that serves everything; without it, the environment variable EXEMPLAR_SERVER, then
+    127.0.0.1:50051. learning, executor, recorder: addresses of single services that are elsewhere. timeout: limit of
+    each call in seconds, None for none; learning, planning and executing have none. Every call takes a `timeout` of
+    its own (math.inf: none).
+
+    Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the first
+    call. Belongs to one event loop. Use it as an asynchronous context manager, or await close().
+    """
+
+    def __init__(
+        self,
+        server: str | None = None,
+        *,
+        learning: str | None = None,
+        executor: str | None = None,
+        recorder: str | None = None,
+        timeout: float | None = 30.0,
+    ) -> None:
+        self._link = AsyncLink(Settings(server, learning, executor, recorder, timeout))
+        self.trials = AsyncTrials(self._link)
+        self.skills = AsyncSkills(self._link)
+        self.robot = AsyncRobot(self._link)
+        self.recorder = AsyncRecorder(self._link)
+
+    def skill(self, name: str, version: int = 0) -> AsyncSkill:
+        """One skill by name, without asking whether it is there. version: 0 for the current one."""
+        return AsyncSkill(self, name, version)
+
+    async def close(self) -> None:
+        """Ends all calls and connections."""
+        await self._link.close()
+
+    async def __aenter__(self) -> AsyncClient:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+
+class AsyncTrials:
+    """Demonstrations, kept for skills."""
+
+    def __init__(self, link: AsyncLink) -> None:
+        self._link = link
+
+    async def submit(self, skill: str, trial: TrialFile, *, timeout: float | None = None) -> Submission:
+        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it survives a crash."""
+        return await self._link.upload(_calls.submit(skill, trial), timeout)
+
+    async def list(self, skill: str = "", *, timeout: float | None = None) -> tuple[TrialInfo, ...]:
+        """The trials of a skill in the order of submission; "": of all skills."""
+        return await self._link.unary(_calls.list_trials(skill), timeout)
+
+    async def get(self, trial_id: str, *, timeout: float | None = None) -> TrialInfo:
+        """What is known of one trial."""
+        return await self._link.unary(_calls.get_trial(trial_id), timeout)
+
+    async def load(self, trial_id: str, *, timeout: float | None = None) -> Trial:
+        """A trial's samples."""
+        return await self._link.unary(_calls.load_trial(trial_id), timeout)
+
+    async def segments(
+        self, trial_id: str, options: Options | None = None, *, timeout: float | None = None
+    ) -> Segmentation:
+        """Candidate episode boundaries of a stored trial."""
+        return await self._link.upload(_calls.segments(trial_id, options), timeout)
+
+    async def segments_of(
+        self, trial: TrialFile, options: Options | None = None, *, timeout: float | None = None
+    ) -> Segmentation:
+        """The same of a file or a Trial, which is not stored."""
+        return await self._link.upload(_calls.segments_of(trial, options), timeout)
+
+    async def export(self, trial_id: str, *, timeout: float | None = None) -> bytes:
+        """The trial as a CSV file, its streams interpolated onto the times of the densest."""
+        return await self._link.download(_calls.export_trial(trial_id), timeout)
+
+    async def delete(self, trial_id: str, *, timeout: float | None = None) -> None:
+        """Removes a trial; skills that were learned from it stay as they are."""
+        return await self._link.unary(_calls.delete_trial(trial_id), timeout)
+
+
+class AsyncSkills:
+    """Skills: learned from trials, asked for motions. version: 0 for the current one."""
+
+    def __init__(self, link: AsyncLink) -> None:
+        self._link = link
+
+    def learn(
+        self, name: str, options: Options | None = None, *, timeout: float | None = None
+    ) -> AsyncOperation[Progress, SkillReport]:
+        """Learns the next version from all trials of the skill. Cancelling it changes nothing."""
+        return self._link.long(_calls.learn(name, options), timeout)
+
+    async def get(self, name: str, *, version: int = 0, timeout: float | None = None) -> SkillReport:
+        """The report of one version."""
+        return await self._link.unary(_calls.get_skill(name, version), timeout)
+
+    async def list(self, *, timeout: float | None = None) -> tuple[SkillInfo, ...]:
+        """All skills, by name."""
+        return await self._link.unary(_calls.list_skills(), timeout)
+
+    async def versions(self, name: str, *, timeout: float | None = None) -> tuple[SkillVersion, ...]:
+        """All versions of a skill, oldest first."""
+        return await self._link.unary(_calls.versions(name), timeout)
+
+    async def rollback(self, name: str, version: int, *, timeout: float | None = None) -> None:
+        """Makes an older version the current one. Nothing is lost."""
+        return await self._link.unary(_calls.rollback(name, version), timeout)
+
+    async def query(
+        self,
+        name: str,
+        objects: Objects,
+        *,
+        start: PoseLike | None = None,
+        joint_start: JointStart | None = None,
+        version: int = 0,
+        timeout: float | None = None,
+    ) -> Motion:
+        """The motion for object poses by name (base frame).
+
+        start: tool pose where the motion is to begin (None: the trials' mean). joint_start: joint positions there, by name
+        or in the skill's joint order (rad or m).
+        """
+        call = _calls.query_skill(name, objects, start, joint_start, version)
+        return await self._link.unary(call, timeout)
+
+    def query_stream(self, name: str, *, version: int = 0, timeout: float | None = None) -> AsyncMotionStream:
+        """Opens a stream of questions, for moving objects. timeout: of the whole stream (None: none)."""
+        return AsyncMotionStream(QueryStream(name, version), self._link, timeout)
+
+    async def evaluate(
+        self, name: str, trial: TrialFile, *, version: int = 0, timeout: float | None = None
+    ) -> Evaluation:
+        """How far the skill's answer is from a trial that it was not learned from."""
+        return await self._link.upload(_calls.evaluate(name, trial, version), timeout)
+
+    async def suggest(
+        self, name: str, count: int = 3, *, version: int = 0, timeout: float | None = None
+    ) -> Suggestions:
+        """Where another demonstration would tell most; count: 1 to 20 places."""
+        return await self._link.unary(_calls.suggest(name, count, version), timeout)
+
+    async def delete(self, name: str, *, timeout: float | None = None) -> None:
+        """Removes all versions; the trials stay."""
+        return await self._link.unary(_calls.delete_skill(name), timeout)
+
+    async def export(self, name: str, *, version: int = 0, timeout: float | None = None) -> bytes:
+        """The whole skill as a JSON document."""
+        return await self._link.download(_calls.export_skill(name, version), timeout)
+
+
+class AsyncRobot:
+    """The robot of the executor's station. One motion at a time."""
+
+    def __init__(self, link: AsyncLink) -> None:
+        self._link = link
+
+    async def plan(
+        self,
+        skill: str,
+        objects: Objects | None = None,
+        *,
+        speed: float = 1.0,
+        start: PoseLike | None = None,
+        version: int = 0,
+        timeout: float | None = None,
+    ) -> Plan:
+        """Everything but the motion. Raises FailedPreconditionError when it is unsafe or out of reach."""
+        return await self._link.unary(_calls.plan(skill, objects, speed, start, version), timeout)
+
+    def execute(
+        self,
+        skill: str,
+        objects: Objects | None = None,
+        *,
+        speed: float = 1.0,
+        start: PoseLike | None = None,
+        detached: bool = False,
+        version: int = 0,
+        timeout: float | None = None,
+    ) -> AsyncOperation[Feedback, ExecutionResult]:
+        """Plans and moves; feedback about ten times a second.
+
+        objects: None for where they are seen now. speed: over 0, at most 1. start: tool pose to go to first. Cancelling
+        the call slows the robot down and holds it. detached: the result comes once the robot moves, and the end of the
+        call does not end the motion. A motion that was aborted is a result (`result.done` is false), one that was
+        refused is an exception.
+        """
+        call = _calls.execute(skill, objects, speed, start, detached, version)
+        return self._link.long(call, timeout)
+
+    async def status(self, *, timeout: float | None = None) -> RobotStatus:
+        """State, joints, tool and the objects seen."""
+        return await self._link.unary(_calls.robot_status(), timeout)
+
+    async def pause(self, *, timeout: float | None = None) -> None:
+        """Holds on the path."""
+        return await self._link.unary(_calls.robot("Pause"), timeout)
+
+    async def resume(self, *, timeout: float | None = None) -> None:
+        """Goes on from there."""
+        return await self._link.unary(_calls.robot("Resume"), timeout)
+
+    async def cancel(self, *, timeout: float | None = None) -> None:
+        """Ends the motion smoothly."""
+        return await self._link.unary(_calls.robot("Cancel"), timeout)
+
+    async def stop(self, *, timeout: float | None = None) -> None:
+        """Ends it at once; motions are refused until reset()."""
+        return await self._link.unary(_calls.robot("Stop"), timeout)
+
+    async def reset(self, *, timeout: float | None = None) -> None:
+        """Allows motions again after stop()."""
+        return await self._link.unary(_calls.robot("Reset"), timeout)
+
+    async def set_speed(self, factor: float, *, timeout: float | None = None) -> None:
+        """Scales the speed of this and later motions; over 0, at most 1."""
+        return await self._link.unary(_calls.set_speed(factor), timeout)
+
+
+class AsyncRecorder:
+    """Records a station's topics into MCAP files on the recorder's machine."""
+
+    def __init__(self, link: AsyncLink) -> None:
+        self._link = link
+
+    async def start(
+        self,
+        name: str = "",
+        *,
+        metadata: Mapping[str, str] | None = None,
+        expected_topics: Sequence[str] = (),
+        expect_timeout_s: float = 0.0,
+        split_bytes: int = 0,
+        split_s: float = 0.0,
+        timeout: float | None = None,
+    ) -> RecorderStatus:
+        """Begins a file.
+
+        name: without folder and ending; "": made from the time. metadata: kept in the file. expected_topics: waits
+        until each has a writer, for expect_timeout_s (0: 5 s). split_bytes, split_s: a new file after so much (0: as
+        the recorder was told).
+        """
+        call = _calls.start_recording(name, metadata, expected_topics, expect_timeout_s, split_bytes, split_s)
+        return await self._link.unary(call, timeout)
+
+    async def stop(self, *, timeout: float | None = None) -> RecorderStatus:
+        """Ends the file: complete and on the disk when this returns."""
+        return await self._link.unary(_calls.recorder("Stop"), timeout)
+
+    async def pause(self, *, timeout: float | None = None) -> RecorderStatus:
+        """Leaves out what comes from now on."""
+        return await self._link.unary(_calls.recorder("Pause"), timeout)
+
+    async def resume(self, *, timeout: float | None = None) -> RecorderStatus:
+        """Goes on in the same file."""
+        return await self._link.unary(_calls.recorder("Resume"), timeout)
+
+    async def mark_event(
+        self,
+        note: str,
+        *,
+        name: str = "",
+        metadata: Mapping[str, str] | None = None,
+        timeout: float | None = None,
+    ) -> RecorderStatus:
+        """Marks an event; without a recording, begins one (`name`) that holds the seconds before it as well."""
+        return await self._link.unary(_calls.mark_event(note, name, metadata), timeout)
+
+    async def status(self, *, timeout: float | None = None) -> RecorderStatus:
+        """State, file, and what was sent, received and lost on each topic."""
+        return await self._link.unary(_calls.recorder("GetStatus"), timeout)
+
+
+class AsyncSkill:
+    """One skill of a client, by its name."""
+
+    def __init__(self, client: AsyncClient, name: str, version: int) -> None:
+        self._client = client
+        self._target: str | None = None
+        self.name = name
+        self.version = version
+
+    async def submit(self, *trials: str | os.PathLike[str] | Trial) -> list[Submission]:
+        """Stores trials for it, in order."""
+        return [await self._client.trials.submit(self.name, trial) for trial in trials]
+
+    def learn(self, options: Options | None = None) -> AsyncOperation[Progress, SkillReport]:
+        """Learns its next version from all of its trials."""
+        return self._client.skills.learn(self.name, options)
+
+    async def report(self) -> SkillReport:
+        """What learning found."""
+        return await self._client.skills.get(self.name, version=self.version)
+
+    async def query(
+        self,
+        objects: Objects | PoseLike,
+        *,
+        start: PoseLike | None = None,
+        joint_start: JointStart | None = None,
+    ) -> Motion:
+        """The motion for object poses by name; a pose alone is that of the object that the skill is about."""
+        return await self._client.skills.query(
+            self.name,
+            await self._named(objects),
+            start=start,
+            joint_start=joint_start,
+            version=self.version,
+        )
+
+    def query_stream(self) -> AsyncMotionStream:
+        """Opens a stream of questions, for moving objects."""
+        return self._client.skills.query_stream(self.name, version=self.version)
+
+    async def execute(
+        self,
+        objects: Objects | PoseLike | None = None,
+        *,
+        speed: float = 1.0,
+        start: PoseLike | None = None,
+    ) -> AsyncOperation[Feedback, ExecutionResult]:
+        """Carries it out; as `client.robot.execute`."""
+        named = None if objects is None else await self._named(objects)
+        return self._client.robot.execute(self.name, named, speed=speed, start=start, version=self.version)
+
+    async def _named(self, objects: Objects | PoseLike) -> Objects:
+        if isinstance(objects, Mapping):
+            return objects
+        if self._target is None:
+            self._target = (await self.report()).target
+        return {self._target: objects}

@@ -1,0 +1,175 @@
+"""Carries calls out and waits for them."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterator
+from typing import Any, Generic, TypeVar
+
+import grpc
+
+from . import _calls
+from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings
+from ._errors import from_rpc
+from ._pose import Objects, PoseLike
+from ._values import Motion
+from ._wire import Message, Method
+
+T = TypeVar("T")
+P = TypeVar("P")
+
+
+class Operation(Generic[P, T]):
+    """A call that takes long: iterate over it for what is known on the way, then ask for its result.
+
+    for progress in (learning := client.skills.learn("press")):
+        print(progress.step)
+    report = learning.result()
+
+    It runs from the moment it is made. It is cancelled by cancel() (from any thread), at the end of a `with` block, and when
+    nobody holds it any more.
+    """
+
+    def __init__(self, call: _calls.Long[P, T], stream: Any, address: str) -> None:
+        self._outcome = Outcome(call)
+        self._stream = stream
+        self._address = address
+
+    def __iter__(self) -> Iterator[P]:
+        return self
+
+    def __next__(self) -> P:
+        if self._outcome.ended:
+            raise StopIteration
+        try:
+            progress = self._outcome.take(next(self._stream))
+            if progress is None:
+                next(self._stream, None)
+                raise StopIteration
+            return progress
+        except StopIteration:
+            self._outcome.finish()
+            raise
+        except grpc.RpcError as error:
+            raise self._outcome.fail(from_rpc(error, self._address)) from None
+
+    def result(self) -> T:
+        """Waits for the end. Raises what the service refused or what broke the call."""
+        for _ in self:
+            pass
+        return self._outcome.value()
+
+    def cancel(self) -> None:
+        """Ends the call; iterating over it and its result raise CancelledError."""
+        self._stream.cancel()
+
+    def __enter__(self) -> Operation[P, T]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if not self._outcome.ended:
+            self.cancel()
+
+
+class MotionStream:
+    """One skill, asked again and again as its objects move: a question costs less than a call. Thread-safe."""
+
+    def __init__(self, questions: QueryStream, link: Link, timeout: float | None) -> None:
+        self._questions = questions
+        self._address = link.settings.address(questions.method)
+        self._requests: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        open_stream = link.channel(questions.method).stream_stream(questions.method.path, **questions.method.codec())
+        self._answers = open_stream(
+            iter(self._requests.get, None),
+            timeout=_calls.limit_s(None, timeout, long=True),
+            metadata=link.settings.metadata(),
+        )
+
+    def query(
+        self,
+        objects: Objects,
+        *,
+        start: PoseLike | None = None,
+        joint_start: _calls.JointStart | None = None,
+    ) -> Motion:
+        """As `client.skills.query`. An error of the question leaves the stream open; one of the connection ends it."""
+        with self._lock:
+            self._requests.put(self._questions.request(objects, start, joint_start))
+            try:
+                for answer in self._answers:
+                    if self._questions.answers(answer):
+                        return self._questions.read(answer)
+            except grpc.RpcError as error:
+                raise from_rpc(error, self._address) from None
+        raise self._questions.ended(self._address)
+
+    def close(self) -> None:
+        """Ends the stream."""
+        self._requests.put(None)
+        self._answers.cancel()
+
+    def __enter__(self) -> MotionStream:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Link:
+    """Channels to the services, one an address, opened when first used. Thread-safe."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._channels: dict[str, grpc.Channel] = {}
+        self._lock = threading.Lock()
+
+    def channel(self, method: Method) -> Any:
+        """The channel to who serves a method."""
+        address = self.settings.address(method)
+        with self._lock:
+            if address not in self._channels:
+                self._channels[address] = grpc.insecure_channel(address, options=CHANNEL_OPTIONS)
+            return self._channels[address]
+
+    def close(self) -> None:
+        """Ends all calls."""
+        with self._lock:
+            for channel in self._channels.values():
+                channel.close()
+            self._channels.clear()
+
+    def unary(self, call: _calls.Unary[T], timeout: float | None = None) -> T:
+        """Answers."""
+        invoke = self.channel(call.method).unary_unary(call.method.path, **call.method.codec())
+        return call.read(self._wait(call.method, invoke, call.request, timeout, call.long))
+
+    def upload(self, call: _calls.Upload[T], timeout: float | None = None) -> T:
+        """Answers once the file is sent."""
+        invoke = self.channel(call.method).stream_unary(call.method.path, **call.method.codec())
+        return call.read(self._wait(call.method, invoke, call.requests(), timeout, False))
+
+    def download(self, call: _calls.Download, timeout: float | None = None) -> bytes:
+        """The file's bytes."""
+        stream = self._open(call.method, call.request, _calls.limit_s(self.settings.timeout, timeout, False))
+        try:
+            return b"".join(part.chunk.data for part in stream)
+        except grpc.RpcError as error:
+            raise from_rpc(error, self.settings.address(call.method)) from None
+
+    def long(self, call: _calls.Long[P, T], timeout: float | None = None) -> Operation[P, T]:
+        """Begins."""
+        stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
+        return Operation(call, stream, self.settings.address(call.method))
+
+    def _open(self, method: Method, request: Message, limit_s: float | None) -> Any:
+        invoke = self.channel(method).unary_stream(method.path, **method.codec())
+        return invoke(request, timeout=limit_s, metadata=self.settings.metadata())
+
+    def _wait(self, method: Method, invoke: Any, request: Any, timeout: float | None, long: bool) -> Message:
+        limit_s = _calls.limit_s(self.settings.timeout, timeout, long)
+        try:
+            return invoke(request, timeout=limit_s, metadata=self.settings.metadata())
+        except grpc.RpcError as error:
+            raise from_rpc(error, self.settings.address(method)) from None
