@@ -1,6 +1,6 @@
 """Teaches a skill from trial files and asks it for a motion.
 
-python 01_learn_and_query.py trial1.csv trial2.csv trial3.csv [--server HOST:PORT]
+Usage: python 01_learn_and_query.py trial1.csv trial2.csv trial3.csv [--server HOST:PORT]
 """
 
 import argparse
@@ -36,9 +36,8 @@ def main() -> None:
         print(f"{len(motion)} frames, {motion.duration_s:.1f} s, ends at {motion.positions[-1].round(3)}")
         for contact in motion.contacts:
             time_s = motion.time_s[contact.first]
-            print(
-                f"touches {contact.object} at {time_s:.1f} s, expected error {1000 * motion.sigma_m[contact.first]:.1f} mm"
-            )
+            sigma_mm = 1000 * motion.sigma_m[contact.first]
+            print(f"touches {contact.object} at {time_s:.1f} s, expected error {sigma_mm:.1f} mm")
 
         try:
             skill.query({"elephant": [0.5, 0.0, 0.1]})

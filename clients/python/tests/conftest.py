@@ -1,6 +1,7 @@
 """Real services for the tests: EXEMPLAR_BIN holds the programs of the build."""
 
 import pathlib
+import socket
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -39,7 +40,10 @@ class Station:
     def executor(self) -> str:
         if "executor" not in self._addresses:
             self.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", SCENE, "--cameras", "off")
-        return self._server("executor", "--robot", ROBOT, "--scene", SCENE, "--learning", self.learning())
+            address = self._server("executor", "--robot", ROBOT, "--scene", SCENE, "--learning", self.learning())
+            with exemplar.Client(address) as client:
+                processes.wait_for(lambda: len(client.robot.status().joints) > 0, "the robot's joint state")
+        return self._addresses["executor"]
 
     def _server(self, name: str, *words: object, bus: bool = True) -> str:
         if name not in self._addresses:
@@ -57,6 +61,13 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     running = Station(tmp_path_factory.mktemp("station"))
     yield running
     running.programs.end()
+
+
+@pytest.fixture
+def silent() -> Iterator[str]:
+    """The address of somebody who takes connections and never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        yield f"127.0.0.1:{listener.getsockname()[1]}"
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import BUTTON, Station
 
 import exemplar
+from conftest import BUTTON, Station
 
 NAMESPACES = ("trials", "skills", "robot", "recorder")
 
@@ -101,14 +101,22 @@ def test_cancelling_a_call_is_an_error_and_cancelling_a_task_is_asyncios(
     run(station, body)
 
 
-def test_errors_and_deadlines_are_those_of_the_other_client(station: Station, press: exemplar.Skill) -> None:
+def test_errors_and_deadlines_are_those_of_the_other_client(
+    station: Station, press: exemplar.Skill, silent: str
+) -> None:
     async def body(client: exemplar.AsyncClient) -> None:
         with pytest.raises(exemplar.InvalidArgumentError) as invalid:
             await client.skills.query("press", {"": BUTTON})
         assert invalid.value.field == "query.objects[0].name"
         with pytest.raises(exemplar.NotFoundError):
             await client.skill("nothing").learn().result()
-        with pytest.raises(exemplar.DeadlineExceededError):
-            await client.skills.query("press", {"target": BUTTON}, timeout=1e-6)
+        async with exemplar.AsyncClient(silent, timeout=0.01) as waiting:
+            with pytest.raises(exemplar.DeadlineExceededError):
+                await waiting.skills.list()
+            with pytest.raises(exemplar.DeadlineExceededError):
+                await waiting.skills.learn("press", timeout=0.01).result()
+            async with waiting.skills.query_stream("press", timeout=0.01) as stream:
+                with pytest.raises(exemplar.DeadlineExceededError):
+                    await stream.query({"target": BUTTON})
 
     run(station, body)

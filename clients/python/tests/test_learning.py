@@ -7,9 +7,9 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import BUTTON, BUTTONS
 
 import exemplar
+from conftest import BUTTON, BUTTONS
 
 
 def test_a_trial_comes_back_as_it_was_submitted(client: exemplar.Client, files: list[pathlib.Path]) -> None:
@@ -89,7 +89,7 @@ def test_learning_tells_its_progress_and_reports(client: exemplar.Client, press:
     assert report.trials[0].target is not None
     assert any(score.chosen for score in report.methods)
     assert press.report().version == report.version
-    assert client.skills.list()[0].version == report.version
+    assert {skill.name: skill.version for skill in client.skills.list()}["press"] == report.version
     assert [version.current for version in client.skills.versions("press")][-1]
 
     client.skills.rollback("press", 1)
@@ -189,7 +189,7 @@ def test_errors_name_code_and_field(client: exemplar.Client, press: exemplar.Ski
         client.skill("nothing").learn().result()
     with pytest.raises(FileNotFoundError):
         client.trials.submit("press", "absent.csv")
-    with pytest.raises(exemplar.FailedPreconditionError, match="does not serve|unimplemented|Unimplemented|"):
+    with pytest.raises(exemplar.FailedPreconditionError, match="does not serve"):
         client.robot.status()
 
 
@@ -204,11 +204,16 @@ def test_a_cancelled_learning_changes_nothing(client: exemplar.Client, press: ex
     assert client.skills.versions("press") == before
 
 
-def test_a_call_has_a_deadline(client: exemplar.Client, press: exemplar.Skill) -> None:
-    with pytest.raises(exemplar.DeadlineExceededError) as late:
-        client.skills.query("press", {"target": BUTTON}, timeout=1e-6)
-    assert isinstance(late.value, TimeoutError)
-    with pytest.raises(exemplar.DeadlineExceededError):
-        client.skills.learn("press", timeout=1e-3).result()
-    with pytest.raises(exemplar.InvalidArgumentError, match="timeout"):
-        client.skills.list(timeout=0)
+def test_a_call_has_a_deadline(silent: str) -> None:
+    with exemplar.Client(silent, timeout=0.01) as client:
+        with pytest.raises(exemplar.DeadlineExceededError, match=silent) as late:
+            client.skills.list()
+        assert isinstance(late.value, TimeoutError)
+        with pytest.raises(exemplar.DeadlineExceededError):
+            client.skills.learn("press", timeout=0.01).result()
+        with pytest.raises(exemplar.DeadlineExceededError):
+            client.trials.export("any")
+        with client.skills.query_stream("press", timeout=0.01) as stream, pytest.raises(TimeoutError):
+            stream.query({"target": BUTTON})
+        with pytest.raises(exemplar.InvalidArgumentError, match="timeout"):
+            client.skills.list(timeout=0)

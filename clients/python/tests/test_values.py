@@ -128,7 +128,7 @@ def test_addresses_are_checked_and_default_to_the_environment(monkeypatch: pytes
 
 def test_nobody_at_the_address_is_unavailable() -> None:
     with exemplar.Client("127.0.0.1:1") as client:
-        with pytest.raises(exemplar.UnavailableError, match="127.0.0.1:1") as gone:
+        with pytest.raises(exemplar.UnavailableError, match="no answer from 127") as gone:
             client.skills.list()
         assert isinstance(gone.value, ConnectionError)
         with pytest.raises(exemplar.UnavailableError):

@@ -7,8 +7,8 @@ with exemplar.Client() as client:
     motion = press.query([0.45, -0.20, 0.06])
     print(motion.positions)
 
-Everywhere: SI units, named at the end of a field (_s, _m, _n, _rad); poses are in the robot's base frame; quaternions are
-qx qy qz qw.
+Everywhere: SI units, named at the end of a field (_s, _m, _n, _rad); poses are in the robot's base frame; quaternions
+are qx qy qz qw.
 """
 
 from ._aio import AsyncMotionStream, AsyncOperation

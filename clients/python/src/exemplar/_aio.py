@@ -27,8 +27,8 @@ class AsyncOperation(Generic[P, T]):
         print(progress.step)
     report = await learning.result()
 
-    It runs from the moment it is made. It is cancelled by cancel(), at the end of an `async with` block, and with the task that
-    waits for it.
+    It runs from the moment it is made. It is cancelled by cancel(), at the end of an `async with` block, and with the
+    task that waits for it.
     """
 
     def __init__(self, call: _calls.Long[P, T], stream: Any, address: str) -> None:

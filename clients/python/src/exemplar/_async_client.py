@@ -38,8 +38,8 @@ class AsyncClient:
     each call in seconds, None for none; learning, planning and executing have none. Every call takes a `timeout` of
     its own (math.inf: none).
 
-    Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the first
-    call. Belongs to one event loop. Use it as an asynchronous context manager, or await close().
+    Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the
+    first call. Belongs to one event loop. Use it as an asynchronous context manager, or await close().
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class AsyncTrials:
         self._link = link
 
     async def submit(self, skill: str, trial: TrialFile, *, timeout: float | None = None) -> Submission:
-        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it survives a crash."""
+        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it is safe."""
         return await self._link.upload(_calls.submit(skill, trial), timeout)
 
     async def list(self, skill: str = "", *, timeout: float | None = None) -> tuple[TrialInfo, ...]:
@@ -155,8 +155,8 @@ class AsyncSkills:
     ) -> Motion:
         """The motion for object poses by name (base frame).
 
-        start: tool pose where the motion is to begin (None: the trials' mean). joint_start: joint positions there, by name
-        or in the skill's joint order (rad or m).
+        start: tool pose where the motion is to begin (None: the trials' mean). joint_start: joint positions there, by
+        name or in the skill's joint order (rad or m).
         """
         call = _calls.query_skill(name, objects, start, joint_start, version)
         return await self._link.unary(call, timeout)

@@ -38,8 +38,8 @@ class Client:
     each call in seconds, None for none; learning, planning and executing have none. Every call takes a `timeout` of
     its own (math.inf: none).
 
-    Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the first
-    call. Thread-safe. Use it as a context manager, or close() it.
+    Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the
+    first call. Thread-safe. Use it as a context manager, or close() it.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Trials:
         self._link = link
 
     def submit(self, skill: str, trial: TrialFile, *, timeout: float | None = None) -> Submission:
-        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it survives a crash."""
+        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it is safe."""
         return self._link.upload(_calls.submit(skill, trial), timeout)
 
     def list(self, skill: str = "", *, timeout: float | None = None) -> tuple[TrialInfo, ...]:
@@ -153,8 +153,8 @@ class Skills:
     ) -> Motion:
         """The motion for object poses by name (base frame).
 
-        start: tool pose where the motion is to begin (None: the trials' mean). joint_start: joint positions there, by name
-        or in the skill's joint order (rad or m).
+        start: tool pose where the motion is to begin (None: the trials' mean). joint_start: joint positions there, by
+        name or in the skill's joint order (rad or m).
         """
         call = _calls.query_skill(name, objects, start, joint_start, version)
         return self._link.unary(call, timeout)

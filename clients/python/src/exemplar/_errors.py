@@ -82,9 +82,7 @@ class InternalError(ExemplarError):
     """A fault of the service."""
 
 
-_BY_CODE: dict[str, type[ExemplarError]] = {
-    kind.code: kind for kind in (*ExemplarError.__subclasses__(), InternalError)
-}
+_BY_CODE: dict[str, type[ExemplarError]] = {kind.code: kind for kind in ExemplarError.__subclasses__()}
 
 # What a code of gRPC means that came without our detail: from gRPC itself, or from a server that is not ours.
 _WITHOUT_DETAIL: dict[grpc.StatusCode, type[ExemplarError]] = {
@@ -92,7 +90,6 @@ _WITHOUT_DETAIL: dict[grpc.StatusCode, type[ExemplarError]] = {
     grpc.StatusCode.OUT_OF_RANGE: InvalidArgumentError,
     grpc.StatusCode.PERMISSION_DENIED: FailedPreconditionError,
     grpc.StatusCode.UNAUTHENTICATED: FailedPreconditionError,
-    grpc.StatusCode.UNIMPLEMENTED: FailedPreconditionError,
 }
 
 
@@ -111,6 +108,8 @@ def from_rpc(error: Any, address: str) -> ExemplarError:
         return UnavailableError(f"no answer from {address}: {error.details()}")
     if code == grpc.StatusCode.DEADLINE_EXCEEDED:
         return DeadlineExceededError(f"{address} did not answer in time")
+    if code == grpc.StatusCode.UNIMPLEMENTED:
+        return FailedPreconditionError(f"{address} does not serve this call: {error.details()}")
     if code == grpc.StatusCode.CANCELLED:
         return CancelledError(f"the call to {address} was cancelled")
     kind = _WITHOUT_DETAIL.get(code) or _BY_CODE.get(code.name.lower(), InternalError)

@@ -14,7 +14,7 @@ from ._errors import InvalidArgumentError
 Array: TypeAlias = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Pose:
     """base_T_frame: where a frame is in the robot's base frame.
 
@@ -23,16 +23,11 @@ class Pose:
     """
 
     position: Array
-    quaternion: Array | None = None
+    quaternion: Array | None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "position", numbers(self.position, 3, "position"))
-        if self.quaternion is not None:
-            quaternion = numbers(self.quaternion, 4, "quaternion")
-            norm = float(np.linalg.norm(quaternion))
-            if norm < 1e-9:
-                raise InvalidArgumentError("quaternion is zero", "quaternion")
-            object.__setattr__(self, "quaternion", quaternion / norm)
+    def __init__(self, position: npt.ArrayLike, quaternion: npt.ArrayLike | None = None) -> None:
+        object.__setattr__(self, "position", numbers(position, 3, "position"))
+        object.__setattr__(self, "quaternion", None if quaternion is None else _unit(quaternion))
 
     @classmethod
     def from_matrix(cls, matrix: npt.ArrayLike) -> Pose:
@@ -104,6 +99,14 @@ def as_pose(value: PoseLike, field: str) -> Pose:
         return Pose(array[:3], array[3:] if len(array) == 7 else None)
     except InvalidArgumentError as error:
         raise InvalidArgumentError(f"{field}: {error.message}", field) from error
+
+
+def _unit(values: npt.ArrayLike) -> Array:
+    quaternion = numbers(values, 4, "quaternion")
+    norm = float(np.linalg.norm(quaternion))
+    if norm < 1e-9:
+        raise InvalidArgumentError("quaternion is zero", "quaternion")
+    return quaternion / norm
 
 
 def numbers(values: npt.ArrayLike, count: int, field: str) -> Array:

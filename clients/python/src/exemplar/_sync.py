@@ -27,8 +27,8 @@ class Operation(Generic[P, T]):
         print(progress.step)
     report = learning.result()
 
-    It runs from the moment it is made. It is cancelled by cancel() (from any thread), at the end of a `with` block, and when
-    nobody holds it any more.
+    It runs from the moment it is made. It is cancelled by cancel() (from any thread), at the end of a `with` block, and
+    when nobody holds it any more.
     """
 
     def __init__(self, call: _calls.Long[P, T], stream: Any, address: str) -> None:

@@ -20,7 +20,7 @@ _POSE = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 _WRENCH = {"fx": "_n", "fy": "_n", "fz": "_n", "tx": "_nm", "ty": "_nm", "tz": "_nm"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class ScalarSeries:
     """Named channels sampled together: names (c), time_s (n,) increasing, values (n, c)."""
 
@@ -28,13 +28,13 @@ class ScalarSeries:
     time_s: Array
     values: Array
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "names", tuple(self.names))
-        object.__setattr__(self, "time_s", _times(self.time_s))
-        object.__setattr__(self, "values", _table(self.values, len(self.time_s), len(self.names), "values"))
+    def __init__(self, names: Iterable[str], time_s: npt.ArrayLike, values: npt.ArrayLike) -> None:
+        object.__setattr__(self, "names", tuple(names))
+        object.__setattr__(self, "time_s", _times(time_s))
+        object.__setattr__(self, "values", _table(values, len(self.time_s), len(self.names), "values"))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class PoseSeries:
     """Poses of a frame in the robot's base frame.
 
@@ -43,14 +43,16 @@ class PoseSeries:
 
     time_s: Array
     positions: Array
-    quaternions: Array | None = None
+    quaternions: Array | None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "time_s", _times(self.time_s))
-        n = len(self.time_s)
-        object.__setattr__(self, "positions", _table(self.positions, n, 3, "positions"))
-        if self.quaternions is not None:
-            object.__setattr__(self, "quaternions", _table(self.quaternions, n, 4, "quaternions"))
+    def __init__(
+        self, time_s: npt.ArrayLike, positions: npt.ArrayLike, quaternions: npt.ArrayLike | None = None
+    ) -> None:
+        times = _times(time_s)
+        object.__setattr__(self, "time_s", times)
+        object.__setattr__(self, "positions", _table(positions, len(times), 3, "positions"))
+        given = None if quaternions is None else _table(quaternions, len(times), 4, "quaternions")
+        object.__setattr__(self, "quaternions", given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +80,10 @@ class Trial:
     @property
     def duration_s(self) -> float:
         """From the first to the last sample of joints and end effectors."""
-        moving = [*self.end_effectors.values(), *([self.joints] if self.joints else [])]
-        times = [series.time_s for series in moving if len(series.time_s)]
+        times = [series.time_s for series in self.end_effectors.values()]
+        if self.joints is not None:
+            times.append(self.joints.time_s)
+        times = [time_s for time_s in times if len(time_s)]
         if not times:
             return 0.0
         return float(max(t[-1] for t in times) - min(t[0] for t in times))
