@@ -211,6 +211,7 @@ void AddTrialCommands(Command& root, const Session& session) {
       "segments",
       "Shows the candidate markers (episode boundaries) of one trial, with cause and score",
       {"exemplar trial segments trial1.csv --format text",
+       "exemplar trial segments trial1.csv --option threshold=local --option cues=extrema",
        "exemplar trial segments trial-0f3c5a7be1d20496 --option rule=literal"});
   command.Argument("FILE|ID", segments->trial, "a file here (it is sent), or a stored trial");
   command.Option("--option", "NAME=VALUE", segments->options,

@@ -103,6 +103,7 @@ std::vector<std::string> StreamNames(const demonstration::Trial& trial) {
     }
   };
   add_scalars(trial.joints, "joints");
+  add_scalars(trial.measured_joints, "measured joints");
   for (const demonstration::PoseSeries& hand : trial.end_effectors) {
     names.push_back(hand.name.empty() ? "end effector" : "end effector " + hand.name);
   }

@@ -2,7 +2,7 @@
 // (EXEMPLAR_DATA), beside the figures of peers. Prints a table; every choice the learner makes is
 // made inside the training set.
 //
-// usage: learning_accuracy [paper|frames|auto]...
+// usage: learning_accuracy [paper|frames|auto|NAME=VALUE]...   (options hold for all methods)
 
 #include <algorithm>
 #include <chrono>
@@ -28,7 +28,6 @@ using exemplar::Rng;
 using exemplar::demonstration::Trial;
 using exemplar::learning::Evaluation;
 using exemplar::learning::LearnOptions;
-using exemplar::learning::Method;
 using exemplar::learning::NamedTrial;
 using exemplar::learning::Skill;
 
@@ -198,9 +197,17 @@ void Reach(int k, const char* method, const LearnOptions& options, const char* r
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::map<std::string, Method> known = {
-      {"paper", Method::kPaper}, {"frames", Method::kFrames}, {"auto", Method::kAuto}};
-  std::vector<std::string> methods(argv + 1, argv + argc);
+  std::vector<std::string> methods;
+  std::map<std::string, std::string> given;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const std::size_t equals = word.find('=');
+    if (equals == std::string::npos) {
+      methods.push_back(word);
+    } else {
+      given[word.substr(0, equals)] = word.substr(equals + 1);
+    }
+  }
   if (methods.empty()) methods = {"paper", "frames", "auto"};
   if (!std::filesystem::is_directory(DataFolder())) {
     std::printf("skipped: no data at %s (set EXEMPLAR_DATA)\n", DataFolder().c_str());
@@ -210,13 +217,13 @@ int main(int argc, char** argv) {
       "medians; cm and rad (reach_target: plot units)\n%-28s %-7s %8s /%7s  %6s  %6s  %8s   %s\n",
       "data", "method", "Frechet", "end", "turn", "head", "sigma", "best known peer");
   for (const std::string& name : methods) {
-    const auto at = known.find(name);
-    if (at == known.end()) {
-      std::fprintf(stderr, "unknown method \"%s\": paper, frames or auto\n", name.c_str());
+    given["method"] = name;
+    const Result<LearnOptions> read = LearnOptions::FromStrings(given);
+    if (!read.ok()) {
+      std::fprintf(stderr, "%s\n", read.error().message.c_str());
       return 2;
     }
-    LearnOptions options;
-    options.method = at->second;
+    LearnOptions options = *read;
     const char* m = name.c_str();
     LeaveOneOut("rail_pressing", m, options, "3.54 / 1.29, 4.15 / 1.88");
     LeaveOneOut("rail_pushing", m, options, "7.40 / 2.15, 7.56 / 1.74");

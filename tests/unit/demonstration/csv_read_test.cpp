@@ -46,6 +46,16 @@ TEST(ReadCsv, ReadsEveryGroupOfTheFormat) {
   EXPECT_DOUBLE_EQ(trial.duration_s(), 0.01);
 }
 
+TEST(ReadCsv, ReadsJointsThatTheRobotMeasured) {
+  const Trial trial = MustRead(Csv("time_s,elbow_rad,rail_m,elbow_rad_measured,rail_m_measured",
+                                   {"0,0.5,0.01,0.4,0.02", "0.01,0.6,0.02,0.45,0.03"}));
+  EXPECT_THAT(trial.notices, IsEmpty());
+  EXPECT_THAT(trial.joints.names, ElementsAre("elbow", "rail"));
+  EXPECT_THAT(trial.measured_joints.names, ElementsAre("elbow", "rail"));
+  EXPECT_EQ(trial.measured_joints.values(1, 0), 0.45);
+  EXPECT_THAT(trial.prismatic_joints, ElementsAre("rail"));
+}
+
 TEST(ReadCsv, TakesByteOrderMarkCrLfQuotesAndBlankLines) {
   const Trial plain = MustRead(Csv(kToolHeader, ToolRows(2)));
   const Trial odd = MustRead(

@@ -41,6 +41,7 @@ Trial RandomTrial(Rng& rng, int samples) {
   };
   trial.joints = scalars({"elbow", "rail", "wrist"});
   trial.prismatic_joints = {"rail"};
+  trial.measured_joints = scalars({"elbow", "rail"});
   trial.end_effectors = {poses("", true), poses("left", false)};
   trial.objects = {poses("box", true), poses("red_mark", false)};
   trial.hands = scalars({"", "left"});
@@ -107,6 +108,9 @@ TEST(SameContent, SeesEveryStream) {
   other.notices = {"mended"};
   EXPECT_TRUE(SameContent(trial, other));
   other.objects[1].base_T_frame[2].translation.x() += 1e-12;
+  EXPECT_FALSE(SameContent(trial, other));
+  other = trial;
+  other.measured_joints.values(3, 0) += 1e-12;
   EXPECT_FALSE(SameContent(trial, other));
   other = trial;
   other.label.values(3, 0) += 1;

@@ -247,6 +247,33 @@ TEST(Align, ATrialThatAloneDragsTheNumberOfMarkersDownIsNamed) {
   EXPECT_THAT(Aligned(trials).warnings, Contains(HasSubstr("trial t1 has ")));
 }
 
+// The hand begins to turn as it begins to move: two candidates that no warp could hold apart.
+TEST(Align, CandidatesNearerThanAWarpCanBearAreOne) {
+  std::vector<UniformTrial> trials;
+  for (int i = 0; i < 2; ++i) {
+    UniformTrial trial = EvenTrial(4, 60);
+    trial.id = "t" + std::to_string(i);
+    for (const double t : trial.time_s) {
+      geometry::Pose pose;
+      pose.translation.x() = 0.4 * MinimumJerk((t - 1) / 2);
+      pose.rotation = geometry::ExpSo3({0, 0, MinimumJerk((t - 1.03) / 2)});
+      trial.base_T_tool.push_back(pose);
+    }
+    trials.push_back(std::move(trial));
+  }
+  LearnOptions options;
+  options.cues.orientation = true;
+  const Alignment aligned = Aligned(trials, options);
+  std::vector<double> begins;
+  for (const Marker& marker : aligned.trials[0].segmentation.markers) {
+    if (marker.kind == MarkerKind::kBeginning) begins.push_back(marker.time_s);
+  }
+  ASSERT_EQ(begins.size(), 2u);
+  EXPECT_LT(begins[1] - begins[0], 0.1);
+  EXPECT_EQ(aligned.trials[0].chosen.size(), 1u);
+  EXPECT_EQ(aligned.knots_s.size(), 3u);
+}
+
 TEST(Align, OneTrialIsItsOwnCanonicalMotion) {
   Rng rng(8);
   const Demonstration one = Demonstrate(rng, "one", 1);
@@ -314,6 +341,55 @@ TEST(Align, AnyTrialsGiveOneFiniteMotion) {
       EXPECT_GE(trial.warped.joints.minCoeff(), trial.own.joints.minCoeff() - 1e-12);
     }
   }
+}
+
+TEST(Align, ElasticRegistrationBringsTrialsTogetherWithoutMarkers) {
+  Rng rng(21);
+  LearnOptions options;
+  options.alignment = AlignmentRule::kElastic;
+  std::vector<UniformTrial> trials;
+  for (int i = 0; i < 5; ++i) {
+    const double reach_s = rng.Uniform(1.0, 2.0);
+    const double pause_s = rng.Uniform(0.2, 1.0);
+    const double back_s = rng.Uniform(0.8, 1.4);
+    UniformTrial trial = EvenTrial(0.6 + reach_s + pause_s + back_s, 60);
+    trial.id = "trial" + std::to_string(i);
+    trial.joint_names = {"a", "b"};
+    trial.joints.resize(static_cast<Eigen::Index>(trial.time_s.size()), 2);
+    for (std::size_t k = 0; k < trial.time_s.size(); ++k) {
+      const double there = MinimumJerk((trial.time_s[k] - 0.3) / reach_s);
+      const double back = MinimumJerk((trial.time_s[k] - 0.3 - reach_s - pause_s) / back_s);
+      trial.joints.row(static_cast<Eigen::Index>(k)) << there - back, 0.5 * (there - back) * there;
+    }
+    trials.push_back(std::move(trial));
+  }
+  const auto aligned = Align(trials, options);
+  ASSERT_TRUE(aligned.ok());
+  // How far apart the trials' joints are at one common time, root mean square.
+  const auto spread = [](const Alignment& alignment) {
+    double squared = 0;
+    for (const AlignedTrial& trial : alignment.trials) {
+      squared += (trial.warped.joints - alignment.canonical_joints).squaredNorm();
+    }
+    return std::sqrt(squared / static_cast<double>(alignment.canonical_joints.size()) / 5);
+  };
+  const auto by_markers = Align(trials, {});
+  ASSERT_TRUE(by_markers.ok());
+  EXPECT_LT(spread(*aligned), 0.01);
+  EXPECT_LT(spread(*aligned), 0.3 * spread(*by_markers));
+  for (const AlignedTrial& trial : aligned->trials) {
+    ASSERT_EQ(trial.own_knots_s.size(), aligned->knots_s.size());
+    EXPECT_EQ(trial.own_knots_s.back(), trial.own.time_s.back());
+    for (std::size_t k = 1; k < trial.own_knots_s.size(); ++k) {
+      ASSERT_GT(trial.own_knots_s[k], trial.own_knots_s[k - 1]);
+    }
+  }
+  for (std::size_t k = 1; k < aligned->knots_s.size(); ++k) {
+    ASSERT_GT(aligned->knots_s[k], aligned->knots_s[k - 1]);
+  }
+  EXPECT_EQ(aligned->markers_s.size(), aligned->trials[0].chosen.size() + 2);
+  EXPECT_EQ(aligned->markers_s.back(), aligned->knots_s.back());
+  EXPECT_THAT(aligned->warnings, testing::IsEmpty());
 }
 
 TEST(WarpTrial, OneWarpServesAllStreams) {

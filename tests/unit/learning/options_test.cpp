@@ -27,6 +27,10 @@ TEST(LearnOptions, EveryOptionIsRead) {
                                                                   {"selection", "vote"},
                                                                   {"rule", "literal"},
                                                                   {"force_rate", "signed"},
+                                                                  {"alignment", "elastic"},
+                                                                  {"joints", "measured"},
+                                                                  {"threshold", "local"},
+                                                                  {"cues", "extrema, orientation"},
                                                                   {"target", "button"},
                                                                   {"sample_rate_hz", "50"},
                                                                   {"cutoff_hz", "6.5"},
@@ -37,6 +41,11 @@ TEST(LearnOptions, EveryOptionIsRead) {
   EXPECT_EQ(options->selection, Selection::kVote);
   EXPECT_EQ(options->rule, EpisodeRule::kLiteral);
   EXPECT_EQ(options->force_rate, ForceRate::kSigned);
+  EXPECT_EQ(options->alignment, AlignmentRule::kElastic);
+  EXPECT_EQ(options->joints, JointSource::kMeasured);
+  EXPECT_EQ(options->threshold, ThresholdRule::kLocal);
+  EXPECT_TRUE(options->cues.orientation && options->cues.extrema);
+  EXPECT_EQ(options->ToStrings().at("cues"), "orientation,extrema");
   EXPECT_EQ(options->target, "button");
   EXPECT_EQ(options->sample_rate_hz, 50);
   EXPECT_EQ(options->cutoff_hz, 6.5);
@@ -58,6 +67,10 @@ TEST(LearnOptions, ThePaperBringsItsOwnRulesUnlessTheyAreGiven) {
 TEST(LearnOptions, WrongValuesAreNamedWithWhatIsAllowed) {
   EXPECT_THAT(MessageOf({{"method", "best"}}),
               HasSubstr("option method: \"best\" is not one of auto, paper, frames"));
+  EXPECT_THAT(MessageOf({{"alignment", "soft"}}), HasSubstr("not one of markers, elastic"));
+  EXPECT_THAT(MessageOf({{"threshold", "1"}}), HasSubstr("not one of trial, local"));
+  EXPECT_THAT(MessageOf({{"cues", "extrema,touch"}}),
+              HasSubstr("option cues: \"touch\" is not one of orientation, extrema"));
   EXPECT_THAT(MessageOf({{"sample_rate_hz", "0"}}), HasSubstr("\"0\" is not a number from 1"));
   EXPECT_THAT(MessageOf({{"sample_rate_hz", "nan"}}), HasSubstr("\"nan\" is not a number"));
   EXPECT_THAT(MessageOf({{"cutoff_hz", "-1"}}), HasSubstr("\"-1\""));

@@ -222,6 +222,23 @@ TEST(Prepare, JointsWithoutPosesGetTheirToolFromTheRobotModel) {
   EXPECT_THAT(wrong.error().message, HasSubstr("\"elbov\""));
 }
 
+TEST(Prepare, TheRobotsMeasuredJointsTakeTheSuitsPlaceWhereAsked) {
+  const std::vector<double> times = signal::EvenTimes(0, 4, 241);
+  demonstration::Trial trial;
+  trial.source = "suit.csv";
+  trial.joints = Scalars({"elbow"}, times, [](double t, int) { return MinimumJerk((t - 1) / 2); });
+  LearnOptions options;
+  options.joints = JointSource::kMeasured;
+  const Result<UniformTrial> missing = Prepare(trial, options, nullptr);
+  ASSERT_FALSE(missing.ok());
+  EXPECT_EQ(missing.error().field, "joints");
+  EXPECT_THAT(missing.error().message, HasSubstr("suit.csv: joints=measured"));
+  trial.measured_joints =
+      Scalars({"elbow"}, times, [](double t, int) { return 0.8 * MinimumJerk((t - 1.1) / 2); });
+  EXPECT_NEAR(Prepared(trial).joints(240, 0), 1, 1e-6);
+  EXPECT_NEAR(Prepared(trial, options).joints(240, 0), 0.8, 1e-6);
+}
+
 TEST(Prepare, RefusesWhatHoldsNoMotionAndNamesIt) {
   demonstration::Trial empty;
   empty.source = "empty.csv";

@@ -228,6 +228,22 @@ TEST(Segmentation, BothTermsOfEquation2HaveTheSameDeviation) {
   EXPECT_LT((segmentation.msv - motion - segmentation.touch_term).norm(), 1e-12);
 }
 
+TEST(Segmentation, LettingGoLowersTheSignedSeriesAndRaisesTheAbsoluteOne) {
+  const UniformTrial trial = ReachThatTouchesWithoutStopping();
+  LearnOptions options;
+  options.force_rate = ForceRate::kSigned;
+  const Segmentation with_sign = Segment(trial, options);
+  options.force_rate = ForceRate::kAbsolute;
+  const Segmentation absolute = Segment(trial, options);
+  const Eigen::Index onset = 90;     // 1.5 s
+  const Eigen::Index release = 138;  // 2.3 s
+  EXPECT_GT(with_sign.touch_term[onset], 0);
+  EXPECT_LT(with_sign.touch_term[release], 0);
+  EXPECT_LT(with_sign.msv[release], MeanSquaredVelocity(trial)[release]);
+  EXPECT_GT(absolute.touch_term[onset], 0);
+  EXPECT_GT(absolute.touch_term[release], 0);
+}
+
 TEST(Segmentation, TouchSensorsThatOnlyHissAreIgnored) {
   UniformTrial trial = ReachThatTouchesWithoutStopping();
   Rng rng(3);
@@ -235,6 +251,144 @@ TEST(Segmentation, TouchSensorsThatOnlyHissAreIgnored) {
   const Segmentation segmentation = Segment(trial, {});
   EXPECT_EQ(segmentation.c_tactile, 0);
   EXPECT_EQ(Times(segmentation, MarkerKind::kBeginning).size(), 1u);
+}
+
+// Section 3.1: a press of 2 cm is slow beside a reach of 35 cm.
+UniformTrial QuickReachAndSlowPress(Rng& rng) {
+  UniformTrial trial = EvenTrial(6, 60);
+  trial.joints.resize(static_cast<Eigen::Index>(trial.time_s.size()), 0);
+  trial.has_orientation = false;
+  for (const double t : trial.time_s) {
+    const double x = 0.35 * MinimumJerk((t - 0.5) / 1.0);
+    const double z = 0.02 * MinimumJerk((t - 1.8) / 1.2) - 0.02 * MinimumJerk((t - 3.4) / 1.0);
+    const double back = 0.35 * MinimumJerk((t - 4.6) / 1.0);
+    trial.base_T_tool.push_back(geometry::Pose::FromTranslation(
+        {x - back + rng.Normal(0, 1e-6), rng.Normal(0, 1e-6), -z + rng.Normal(0, 1e-6)}));
+  }
+  return trial;
+}
+
+TEST(Segmentation, ASlowPressBesideAQuickReachIsFoundByLocalThresholdsOnly) {
+  Rng rng(4);
+  const UniformTrial trial = QuickReachAndSlowPress(rng);
+  const auto near = [&](const LearnOptions& options, double time_s) {
+    for (const double t : Times(Segment(trial, options), MarkerKind::kBeginning)) {
+      if (std::abs(t - time_s) < 0.25) return true;
+    }
+    return false;
+  };
+  const LearnOptions whole;
+  LearnOptions local;
+  local.threshold = ThresholdRule::kLocal;
+  for (const LearnOptions& options : {whole, local}) {
+    EXPECT_TRUE(near(options, 0.5));
+    EXPECT_TRUE(near(options, 4.6));
+  }
+  EXPECT_FALSE(near(whole, 1.8));
+  EXPECT_TRUE(near(local, 1.8));
+  EXPECT_EQ(Times(Segment(trial, local), MarkerKind::kBeginning).size(), 4u);
+}
+
+TEST(Segmentation, LocalThresholdsAreGivenOutAndHoldTheirOrder) {
+  Rng rng(5);
+  for (int round = 0; round < 200; ++round) {
+    const Eigen::VectorXd msv = RandomMsv(rng);
+    const ThresholdsAlong along = FindThresholdsAlong(msv);
+    ASSERT_EQ(along.c.size(), msv.size());
+    EXPECT_GT(along.c.minCoeff(), 0);
+    EXPECT_GT((along.high - along.c).minCoeff(), 0);
+    const auto begins = FindBeginnings(msv, along, EpisodeRule::kTwitch);
+    EXPECT_EQ(begins.size(), FindEndings(msv, along, EpisodeRule::kTwitch).size());
+    for (const Boundary& begin : begins) EXPECT_GT(begin.score, 1);
+    const Eigen::VectorXd scaled = 8 * msv;  // a power of two: exact
+    EXPECT_EQ(Frames(FindBeginnings(scaled, FindThresholdsAlong(scaled), EpisodeRule::kTwitch)),
+              Frames(begins));
+  }
+  LearnOptions local;
+  local.threshold = ThresholdRule::kLocal;
+  const UniformTrial trial = QuickReachAndSlowPress(rng);
+  EXPECT_EQ(Segment(trial, local).c_along.size(), Segment(trial, local).msv.size());
+  EXPECT_EQ(Segment(trial, {}).c_along.size(), 0);
+}
+
+TEST(Segmentation, AConstantThresholdAlongTheTrialIsTheTrialsOwn) {
+  Rng rng(6);
+  for (int round = 0; round < 200; ++round) {
+    const Eigen::VectorXd msv = RandomMsv(rng);
+    const Thresholds whole = FindThresholds(msv);
+    const ThresholdsAlong along{Eigen::VectorXd::Constant(msv.size(), whole.c),
+                                Eigen::VectorXd::Constant(msv.size(), whole.high())};
+    for (const EpisodeRule rule : {EpisodeRule::kTwitch, EpisodeRule::kLiteral}) {
+      EXPECT_EQ(Frames(FindBeginnings(msv, along, rule)), Frames(FindBeginnings(msv, whole, rule)));
+    }
+  }
+}
+
+// One reach in whose last third the hand begins to turn.
+TEST(Segmentation, ATurnDuringAReachIsABoundaryByOrientationOnly) {
+  UniformTrial trial = EvenTrial(5, 60);
+  for (const double t : trial.time_s) {
+    geometry::Pose pose;
+    pose.translation.x() = 0.4 * MinimumJerk((t - 0.5) / 2);
+    pose.rotation = geometry::ExpSo3({0, 0, 1.2 * MinimumJerk((t - 2.0) / 1)});
+    trial.base_T_tool.push_back(pose);
+  }
+  LearnOptions options;
+  const auto causes = [&](const std::string& cause) {
+    std::vector<double> times;
+    for (const Marker& marker : Segment(trial, options).markers) {
+      if (marker.cause == cause && marker.kind == MarkerKind::kBeginning) {
+        times.push_back(marker.time_s);
+      }
+    }
+    return times;
+  };
+  EXPECT_THAT(causes("orientation"), IsEmpty());
+  options.cues.orientation = true;
+  const std::vector<double> turns = causes("orientation");
+  ASSERT_EQ(turns.size(), 1u);
+  EXPECT_NEAR(turns[0], 2.1, 0.15);
+  for (geometry::Pose& pose : trial.base_T_tool) pose.rotation.setIdentity();
+  EXPECT_THAT(causes("orientation"), IsEmpty()) << "a tool that never turns";
+}
+
+// Over a wall without a stop: the lift's top is an extremum of one joint only.
+TEST(Segmentation, AJointThatTurnsBackIsABoundaryByExtremaOnly) {
+  UniformTrial trial = EvenTrial(5, 60);
+  trial.joint_names = {"pan", "lift", "still"};
+  trial.joints.resize(static_cast<Eigen::Index>(trial.time_s.size()), 3);
+  for (std::size_t k = 0; k < trial.time_s.size(); ++k) {
+    const double t = trial.time_s[k];
+    const double lift = std::sin(M_PI * MinimumJerk((t - 0.5) / 3));
+    trial.joints.row(static_cast<Eigen::Index>(k)) << MinimumJerk((t - 0.5) / 3), 0.6 * lift,
+        0.01 * std::sin(9 * t);
+  }
+  LearnOptions options;
+  EXPECT_EQ(Times(Segment(trial, options), MarkerKind::kBeginning).size(), 1u);
+  options.cues.extrema = true;
+  int found = 0;
+  for (const Marker& marker : Segment(trial, options).markers) {
+    if (marker.cause != "extremum of lift") {
+      EXPECT_EQ(marker.cause.rfind("extremum", 0), std::string::npos) << marker.cause;
+      continue;
+    }
+    ++found;
+    EXPECT_NEAR(marker.time_s, 2.0, 0.02);
+    EXPECT_NEAR(marker.score, 1, 0.01);
+  }
+  EXPECT_EQ(found, 1);
+}
+
+TEST(Segmentation, AnExtremumThatRestsIsMarkedWhereTheRestEnds) {
+  UniformTrial trial = EvenTrial(5, 60);
+  for (const double t : trial.time_s) {
+    const double z = MinimumJerk((t - 0.5) / 1) - MinimumJerk((t - 3.0) / 1);
+    trial.base_T_tool.push_back(geometry::Pose::FromTranslation({0, 0, 0.2 * z}));
+  }
+  const std::vector<Marker> extrema = FindExtrema(trial);
+  ASSERT_EQ(extrema.size(), 1u);
+  EXPECT_EQ(extrema[0].cause, "extremum of tool z");
+  EXPECT_NEAR(extrema[0].time_s, 3.15, 0.1);
 }
 
 }  // namespace

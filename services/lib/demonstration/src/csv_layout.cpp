@@ -118,6 +118,11 @@ class LayoutReader {
       wrench_[static_cast<std::size_t>(wrench - kWrenchColumns.begin())] = column;
     } else if (const std::string slip = Slip(name); !slip.empty()) {
       return InvalidArgument(place_ + "column \"" + name + "\": " + slip, name);
+    } else if (const auto measured = StripSuffix(name, "rad_measured");
+               measured && !measured->empty()) {
+      AddScalar(layout_.measured_joints, *measured, column);
+    } else if (const auto sliding = StripSuffix(name, "m_measured"); sliding && !sliding->empty()) {
+      AddScalar(layout_.measured_joints, *sliding, column);
     } else if (name.ends_with("_rad") && name.size() > 4) {
       AddScalar(layout_.joints, name.substr(0, name.size() - 4), column);
     } else if (name.ends_with("_m") && name.size() > 2) {

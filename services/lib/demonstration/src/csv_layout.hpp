@@ -30,6 +30,7 @@ struct CsvLayout {
   std::vector<PoseColumns> objects;
   ScalarColumns joints;
   std::vector<std::string> prismatic_joints;
+  ScalarColumns measured_joints;
   ScalarColumns hands;
   ScalarColumns tactile;
   ScalarColumns wrench;  ///< none, three forces, or all six

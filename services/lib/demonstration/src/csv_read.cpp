@@ -37,11 +37,9 @@ class TrialReader {
       if (const Status s = ReadPoses(columns, trial_.objects); !s.ok()) return s.error();
     }
     const std::pair<const ScalarColumns*, ScalarSeries*> groups[] = {
-        {&layout.joints, &trial_.joints},
-        {&layout.hands, &trial_.hands},
-        {&layout.tactile, &trial_.tactile},
-        {&layout.wrench, &trial_.wrench},
-        {&layout.label, &trial_.label}};
+        {&layout.joints, &trial_.joints}, {&layout.measured_joints, &trial_.measured_joints},
+        {&layout.hands, &trial_.hands},   {&layout.tactile, &trial_.tactile},
+        {&layout.wrench, &trial_.wrench}, {&layout.label, &trial_.label}};
     for (const auto& [columns, series] : groups) {
       if (const Status s = ReadScalars(*columns, *series); !s.ok()) return s.error();
     }

@@ -110,14 +110,21 @@ std::vector<std::string> ColumnNames(const ScalarSeries& series, const std::stri
 
 std::vector<ScalarWriter> MakeScalarWriters(const Trial& trial) {
   std::vector<ScalarWriter> writers;
-  if (!trial.joints.empty()) {
+  const auto joint_columns = [&](const ScalarSeries& joints, const std::string& suffix) {
     std::vector<std::string> columns;
-    for (const std::string& joint : trial.joints.names) {
+    for (const std::string& joint : joints.names) {
       const bool prismatic = std::find(trial.prismatic_joints.begin(), trial.prismatic_joints.end(),
                                        joint) != trial.prismatic_joints.end();
-      columns.push_back(joint + (prismatic ? "_m" : "_rad"));
+      columns.push_back(joint + (prismatic ? "_m" : "_rad") + suffix);
     }
-    writers.emplace_back(trial.joints, std::move(columns), false);
+    return columns;
+  };
+  if (!trial.joints.empty()) {
+    writers.emplace_back(trial.joints, joint_columns(trial.joints, ""), false);
+  }
+  if (!trial.measured_joints.empty()) {
+    writers.emplace_back(trial.measured_joints, joint_columns(trial.measured_joints, "_measured"),
+                         false);
   }
   if (!trial.hands.empty()) {
     std::vector<std::string> columns;

@@ -138,11 +138,10 @@ const PoseSeries* Trial::FindObject(std::string_view name) const {
 }
 
 Status Validate(const Trial& trial) {
-  const std::pair<const char*, const ScalarSeries*> scalars[] = {{"joints", &trial.joints},
-                                                                 {"hands", &trial.hands},
-                                                                 {"tactile", &trial.tactile},
-                                                                 {"wrench", &trial.wrench},
-                                                                 {"label", &trial.label}};
+  const std::pair<const char*, const ScalarSeries*> scalars[] = {
+      {"joints", &trial.joints}, {"measured joints", &trial.measured_joints},
+      {"hands", &trial.hands},   {"tactile", &trial.tactile},
+      {"wrench", &trial.wrench}, {"label", &trial.label}};
   for (const auto& [stream, series] : scalars) {
     if (const Status checked = CheckScalars(stream, *series); !checked.ok()) return checked;
   }
@@ -169,9 +168,9 @@ Status Validate(const Trial& trial) {
 
 bool SameContent(const Trial& a, const Trial& b) {
   return Same(a.joints, b.joints) && a.prismatic_joints == b.prismatic_joints &&
-         Same(a.end_effectors, b.end_effectors) && Same(a.objects, b.objects) &&
-         Same(a.hands, b.hands) && Same(a.tactile, b.tactile) && Same(a.wrench, b.wrench) &&
-         Same(a.label, b.label);
+         Same(a.measured_joints, b.measured_joints) && Same(a.end_effectors, b.end_effectors) &&
+         Same(a.objects, b.objects) && Same(a.hands, b.hands) && Same(a.tactile, b.tactile) &&
+         Same(a.wrench, b.wrench) && Same(a.label, b.label);
 }
 
 }  // namespace exemplar::demonstration

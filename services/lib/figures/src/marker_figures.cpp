@@ -44,10 +44,15 @@ Figure CandidateMarkers(const Subject& subject) {
                                             .y = MsvLabel(trial)});
     panel.TightX();
     panel.Line(trial.own.time_s, segmentation.msv, {.colour = kInk, .width = 1.4}, "MSV");
-    panel.Horizontal(segmentation.c, {.colour = kBlue, .width = 1.4, .dash = "6 3"},
-                     "c, low motion (Eq. 3)");
-    panel.Horizontal(segmentation.k * segmentation.c,
-                     {.colour = kPurple, .width = 1.4, .dash = "2 3"}, "kc, high motion (Eq. 4)");
+    const Stroke low{.colour = kBlue, .width = 1.4, .dash = "6 3"};
+    const Stroke high{.colour = kPurple, .width = 1.4, .dash = "2 3"};
+    if (segmentation.c_along.size() > 0) {
+      panel.Line(trial.own.time_s, segmentation.c_along, low, "c, low motion there (Eq. 3)");
+      panel.Line(trial.own.time_s, segmentation.high_along, high, "kc, high motion there (Eq. 4)");
+    } else {
+      panel.Horizontal(segmentation.c, low, "c, low motion (Eq. 3)");
+      panel.Horizontal(segmentation.k * segmentation.c, high, "kc, high motion (Eq. 4)");
+    }
     panel.Marks(MarkerPoints(trial, learning::MarkerKind::kBeginning), Symbol::kTriangle, 11,
                 kGreen, "beginning");
     panel.Marks(MarkerPoints(trial, learning::MarkerKind::kEnding), Symbol::kSquare, 9, kVermilion,
@@ -115,12 +120,14 @@ Figure TimeWarps(const Subject& subject) {
     const std::string colour = TrialColour(i);
     panel.Line(own, warped, {.colour = colour, .width = 2},
                TrialName(subject, bends[i].second, 400));
-    std::vector<Point> knots;
-    for (std::size_t k = 1; k + 1 < trial.own_knots_s.size(); ++k) {
-      knots.push_back({trial.own_knots_s[k] / trial.own_knots_s.back(),
-                       alignment.knots_s[k] / alignment.knots_s.back()});
+    const learning::MonotoneHermite common_at(trial.own_knots_s, alignment.knots_s);
+    std::vector<Point> chosen;
+    for (const int m : trial.chosen) {
+      const double time_s = trial.segmentation.markers[static_cast<std::size_t>(m)].time_s;
+      chosen.push_back(
+          {time_s / trial.own_knots_s.back(), common_at(time_s) / alignment.knots_s.back()});
     }
-    panel.Marks(knots, Symbol::kRing, 9, colour, i == 0 ? "chosen marker" : "");
+    panel.Marks(chosen, Symbol::kRing, 9, colour, i == 0 ? "chosen marker" : "");
   }
   return {.number = 6,
           .title = kTitle,

@@ -119,8 +119,8 @@ Figure AlignedMsv(const Subject& subject) {
     panel.Line(alignment.time_s, series[side].rowwise().mean(),
                {.colour = side == 0 ? kBlue : kVermilion, .width = 2.6},
                side == 0 ? "mean of aligned trials" : "mean of length-normalised trials");
-    for (std::size_t k = 1; side == 0 && k + 1 < alignment.knots_s.size(); ++k) {
-      panel.Vertical(alignment.knots_s[k], {.colour = kGreen, .width = 1.2, .dash = "4 3"},
+    for (std::size_t k = 1; side == 0 && k + 1 < alignment.markers_s.size(); ++k) {
+      panel.Vertical(alignment.markers_s[k], {.colour = kGreen, .width = 1.2, .dash = "4 3"},
                      "mean marker times");
     }
   }

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "elastic.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/learning/aligned.hpp"
+#include "exemplar/learning/hermite.hpp"
 #include "exemplar/learning/marker_choice.hpp"
 #include "exemplar/learning/warp.hpp"
 #include "exemplar/signal/resample.hpp"
@@ -117,6 +119,38 @@ Eigen::MatrixXd WarpedSignals(const std::vector<AlignedTrial>& trials,
   return signals;
 }
 
+// One common course of time for the joints' curves, without joints the tool's, as knots: parts of
+// the own duration, a row a trial.
+std::vector<std::vector<double>> ElasticKnots(const std::vector<AlignedTrial>& trials) {
+  std::vector<Eigen::MatrixXd> curves;
+  for (const AlignedTrial& trial : trials) {
+    const UniformTrial& own = trial.own;
+    if (own.joints.cols() > 0) {
+      curves.push_back(own.joints);
+      continue;
+    }
+    curves.emplace_back(static_cast<Eigen::Index>(own.base_T_tool.size()), 3);
+    for (std::size_t k = 0; k < own.base_T_tool.size(); ++k) {
+      curves.back().row(static_cast<Eigen::Index>(k)) = own.base_T_tool[k].translation.transpose();
+    }
+  }
+  std::vector<std::vector<double>> knots = RegisterElastically(curves);
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    for (double& knot : knots[i]) knot *= trials[i].own.time_s.back();
+  }
+  return knots;
+}
+
+std::vector<double> MeanKnots(const std::vector<std::vector<double>>& own_knots) {
+  std::vector<double> means(own_knots.front().size(), 0);
+  for (const std::vector<double>& knots : own_knots) {
+    for (std::size_t k = 0; k < knots.size(); ++k) {
+      means[k] += knots[k] / static_cast<double>(own_knots.size());
+    }
+  }
+  return means;
+}
+
 // Trials with fewer candidates than all others, whose lack decides how many markers there are.
 void WarnOfFewCandidates(const std::vector<Candidates>& candidates,
                          std::vector<std::string>& warnings) {
@@ -172,7 +206,8 @@ Result<Alignment> Align(std::vector<UniformTrial> trials, const LearnOptions& op
     report(0.2 * static_cast<double>(candidates.size()) / static_cast<double>(trials.size()),
            "segmentation");
   }
-  WarnOfFewCandidates(candidates, result.warnings);
+  const bool elastic = options.alignment == AlignmentRule::kElastic;
+  if (!elastic) WarnOfFewCandidates(candidates, result.warnings);
 
   std::vector<MarkerCandidates> choices;
   for (const Candidates& c : candidates) choices.push_back(c.choice);
@@ -195,14 +230,22 @@ Result<Alignment> Align(std::vector<UniformTrial> trials, const LearnOptions& op
     for (const int c : choice.chosen[i]) {
       result.trials[i].chosen.push_back(candidates[i].marker[static_cast<std::size_t>(c)]);
     }
-    result.trials[i].own_knots_s = own_knots.back();
   }
-  result.knots_s.assign(own_knots.front().size(), 0);
-  for (const std::vector<double>& knots : own_knots) {
-    for (std::size_t k = 0; k < knots.size(); ++k) {
-      result.knots_s[k] += knots[k] / static_cast<double>(n);
+  result.knots_s = MeanKnots(own_knots);
+  result.markers_s = result.knots_s;
+  if (elastic) {
+    const std::vector<std::vector<double>> own_markers = std::move(own_knots);
+    own_knots = ElasticKnots(result.trials);
+    result.knots_s = MeanKnots(own_knots);
+    std::vector<std::vector<double>> common_markers;
+    for (std::size_t i = 0; i < n; ++i) {
+      const MonotoneHermite common_from_own(own_knots[i], result.knots_s);
+      common_markers.emplace_back();
+      for (const double t : own_markers[i]) common_markers.back().push_back(common_from_own(t));
     }
+    result.markers_s = MeanKnots(common_markers);
   }
+  for (std::size_t i = 0; i < n; ++i) result.trials[i].own_knots_s = own_knots[i];
   const int frames =
       options.frames > 0
           ? options.frames

@@ -9,32 +9,33 @@
 namespace exemplar::learning {
 namespace {
 
-// The raw tool path of a trial's main hand; from joints where it has no poses.
+// The raw tool path of a trial's main hand; from `joints` where it has no poses.
 Result<demonstration::PoseSeries> ToolPath(const demonstration::Trial& trial,
+                                           const demonstration::ScalarSeries& joints,
                                            const demonstration::ToolKinematics* tool) {
   for (const demonstration::PoseSeries& hand : trial.end_effectors) {
     if (hand.name.empty()) return hand;
   }
   if (!trial.end_effectors.empty()) return trial.end_effectors.front();
-  if (tool == nullptr || trial.joints.empty()) {
+  if (tool == nullptr || joints.empty()) {
     return InvalidArgument(
         "trial \"" + trial.source + "\" has no end-effector poses to compare with", "trial");
   }
   std::vector<Eigen::Index> columns;
   for (const std::string& name : tool->joint_names()) {
-    const auto at = std::find(trial.joints.names.begin(), trial.joints.names.end(), name);
-    if (at == trial.joints.names.end()) {
+    const auto at = std::find(joints.names.begin(), joints.names.end(), name);
+    if (at == joints.names.end()) {
       return InvalidArgument("trial \"" + trial.source + "\" has no joint \"" + name + "\"",
                              "trial");
     }
-    columns.push_back(at - trial.joints.names.begin());
+    columns.push_back(at - joints.names.begin());
   }
   demonstration::PoseSeries path;
-  path.time_s = trial.joints.time_s;
+  path.time_s = joints.time_s;
   Eigen::VectorXd q(static_cast<Eigen::Index>(columns.size()));
-  for (Eigen::Index i = 0; i < trial.joints.values.rows(); ++i) {
+  for (Eigen::Index i = 0; i < joints.values.rows(); ++i) {
     for (std::size_t k = 0; k < columns.size(); ++k) {
-      q[static_cast<Eigen::Index>(k)] = trial.joints.values(i, columns[k]);
+      q[static_cast<Eigen::Index>(k)] = joints.values(i, columns[k]);
     }
     path.base_T_frame.push_back(tool->ToolPose(q));
   }
@@ -63,7 +64,11 @@ geometry::Pose PoseAt(const demonstration::PoseSeries& series, double time_s) {
 
 Result<Evaluation> Evaluate(const Skill& skill, const demonstration::Trial& trial) {
   const Skill::Data& data = skill.data();
-  const Result<demonstration::PoseSeries> shown = ToolPath(trial, data.tool.get());
+  // As the skill was learned.
+  const auto source = data.report.options.find("joints");
+  const bool measured = source != data.report.options.end() && source->second == "measured";
+  const Result<demonstration::PoseSeries> shown =
+      ToolPath(trial, measured ? trial.measured_joints : trial.joints, data.tool.get());
   if (!shown.ok()) return shown.error();
   if (shown->empty()) {
     return InvalidArgument("trial \"" + trial.source + "\" has no samples", "trial");

@@ -33,6 +33,26 @@ const Choices<ForceRate>& ForceRates() {
                                              {"signed", ForceRate::kSigned}};
   return choices;
 }
+const Choices<JointSource>& JointSources() {
+  static const Choices<JointSource> choices = {{"suit", JointSource::kSuit},
+                                               {"measured", JointSource::kMeasured}};
+  return choices;
+}
+const Choices<AlignmentRule>& AlignmentRules() {
+  static const Choices<AlignmentRule> choices = {{"markers", AlignmentRule::kMarkers},
+                                                 {"elastic", AlignmentRule::kElastic}};
+  return choices;
+}
+const Choices<ThresholdRule>& ThresholdRules() {
+  static const Choices<ThresholdRule> choices = {{"trial", ThresholdRule::kTrial},
+                                                 {"local", ThresholdRule::kLocal}};
+  return choices;
+}
+const Choices<bool Cues::*>& AllCues() {
+  static const Choices<bool Cues::*> choices = {{"orientation", &Cues::orientation},
+                                                {"extrema", &Cues::extrema}};
+  return choices;
+}
 
 Error Wrong(std::string_view name, std::string_view value, std::string_view wanted) {
   return InvalidArgument("option " + std::string(name) + ": \"" + std::string(value) +
@@ -58,6 +78,26 @@ std::string NameOf(T value, const Choices<T>& choices) {
   return {};
 }
 
+Result<Cues> ReadCues(const std::string& value) {
+  Cues cues;
+  for (const std::string_view word : Split(value, ',')) {
+    const std::string_view name = Trim(word);
+    if (name.empty() || name == "none") continue;
+    const Result<bool Cues::*> cue = Choose("cues", name, AllCues());
+    if (!cue) return cue.error();
+    cues.*(*cue) = true;
+  }
+  return cues;
+}
+
+std::string NamesOf(const Cues& cues) {
+  std::vector<std::string> names;
+  for (const auto& [word, cue] : AllCues()) {
+    if (cues.*cue) names.push_back(word);
+  }
+  return names.empty() ? "none" : Join(names, ",");
+}
+
 struct Range {
   double low, high;
 };
@@ -73,9 +113,9 @@ Result<double> Number(std::string_view name, std::string_view value, Range range
 }
 
 const std::vector<std::string>& OptionNames() {
-  static const std::vector<std::string> names = {"method",     "selection", "rule",
-                                                 "force_rate", "target",    "sample_rate_hz",
-                                                 "cutoff_hz",  "frames",    "leave_out"};
+  static const std::vector<std::string> names = {
+      "method", "selection", "rule",           "force_rate", "joints", "alignment", "threshold",
+      "cues",   "target",    "sample_rate_hz", "cutoff_hz",  "frames", "leave_out"};
   return names;
 }
 
@@ -89,6 +129,10 @@ Status Set(LearnOptions& options, const std::string& name, const std::string& va
   if (name == "selection") return take(Choose(name, value, Selections()), options.selection);
   if (name == "rule") return take(Choose(name, value, Rules()), options.rule);
   if (name == "force_rate") return take(Choose(name, value, ForceRates()), options.force_rate);
+  if (name == "joints") return take(Choose(name, value, JointSources()), options.joints);
+  if (name == "alignment") return take(Choose(name, value, AlignmentRules()), options.alignment);
+  if (name == "threshold") return take(Choose(name, value, ThresholdRules()), options.threshold);
+  if (name == "cues") return take(ReadCues(value), options.cues);
   if (name == "sample_rate_hz") {
     return take(Number(name, value, {1, 1000}, "Hz"), options.sample_rate_hz);
   }
@@ -149,6 +193,10 @@ std::map<std::string, std::string> LearnOptions::ToStrings() const {
           {"selection", NameOf(selection, Selections())},
           {"rule", NameOf(rule, Rules())},
           {"force_rate", NameOf(force_rate, ForceRates())},
+          {"joints", NameOf(joints, JointSources())},
+          {"alignment", NameOf(alignment, AlignmentRules())},
+          {"threshold", NameOf(threshold, ThresholdRules())},
+          {"cues", NamesOf(cues)},
           {"target", target},
           {"sample_rate_hz", FormatDouble(sample_rate_hz)},
           {"cutoff_hz", FormatDouble(cutoff_hz)},

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/learning/aligned.hpp"
@@ -266,6 +267,19 @@ Result<UniformTrial> Prepare(const demonstration::Trial& trial, const LearnOptio
                              const demonstration::ToolKinematics* tool) {
   if (const Status valid = demonstration::Validate(trial); !valid.ok()) {
     return WithPlace(valid.error(), trial.source);
+  }
+  if (options.joints == JointSource::kMeasured) {
+    if (trial.measured_joints.empty()) {
+      return InvalidArgument(trial.source +
+                                 ": joints=measured is asked for, and no robot's joints were "
+                                 "recorded beside the suit's",
+                             "joints");
+    }
+    demonstration::Trial measured = trial;
+    measured.joints = std::exchange(measured.measured_joints, {});
+    LearnOptions as_they_are = options;
+    as_they_are.joints = JointSource::kSuit;
+    return Prepare(measured, as_they_are, tool);
   }
   UniformTrial out;
   out.id = trial.source;

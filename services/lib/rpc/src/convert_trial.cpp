@@ -61,6 +61,9 @@ void ToProto(const demonstration::Trial& trial, v1::Trial* message) {
   message->set_source(Utf8(trial.source));
   if (trial.start != Stamp()) ToProto(trial.start, message->mutable_start());
   if (!trial.joints.empty()) ToProto(trial.joints, message->mutable_joints());
+  if (!trial.measured_joints.empty()) {
+    ToProto(trial.measured_joints, message->mutable_measured_joints());
+  }
   for (const auto& series : trial.end_effectors) ToProto(series, message->add_end_effectors());
   for (const auto& series : trial.objects) ToProto(series, message->add_objects());
   if (!trial.hands.empty()) ToProto(trial.hands, message->mutable_hands());
@@ -80,6 +83,7 @@ Result<demonstration::Trial> FromProto(const v1::Trial& message, std::string_vie
   trial.prismatic_joints = FromProto(message.prismatic_joints());
   for (const Status& status :
        {ReadSeries(message.joints(), place + ".joints", trial.joints),
+        ReadSeries(message.measured_joints(), place + ".measured_joints", trial.measured_joints),
         ReadSeries(message.end_effectors(), place + ".end_effectors", trial.end_effectors),
         ReadSeries(message.objects(), place + ".objects", trial.objects),
         ReadSeries(message.hands(), place + ".hands", trial.hands),
@@ -102,6 +106,8 @@ void ToProto(const api::TrialSegments& segments, v1::SegmentTrialResponse* messa
   out->set_k(segmentation.k);
   out->set_c_tactile(segmentation.c_tactile);
   out->set_c_replaced(segmentation.c_replaced);
+  ToProto(segmentation.c_along, out->mutable_c_along());
+  ToProto(segmentation.high_along, out->mutable_high_along());
   for (const learning::Marker& marker : segmentation.markers) ToProto(marker, out->add_markers());
 }
 
@@ -117,6 +123,8 @@ Result<api::TrialSegments> FromProto(const v1::SegmentTrialResponse& message) {
   segmentation.k = in.k();
   segmentation.c_tactile = in.c_tactile();
   segmentation.c_replaced = in.c_replaced();
+  segmentation.c_along = VectorFromProto(in.c_along());
+  segmentation.high_along = VectorFromProto(in.high_along());
   for (const v1::Marker& marker : in.markers()) {
     segmentation.markers.push_back({.time_s = marker.time_s(),
                                     .frame = marker.frame(),

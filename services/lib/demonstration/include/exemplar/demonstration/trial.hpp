@@ -43,6 +43,9 @@ struct Trial {
   Stamp start;          ///< wall time of time_s = 0; zero when unknown
   ScalarSeries joints;  ///< rad (revolute) or m (prismatic): the demonstrator's own
   std::vector<std::string> prismatic_joints;  ///< those of `joints` that are in m
+  /// The same joints as the robot measured them while it followed the demonstrator; empty where no
+  /// robot did.
+  ScalarSeries measured_joints;
   std::vector<PoseSeries> end_effectors;
   std::vector<PoseSeries> objects;
   ScalarSeries hands;    ///< opening, 0 closed to 1 open; channel "" for the main hand

@@ -42,7 +42,8 @@ struct Marker {
   double time_s = 0;
   int frame = 0;  ///< of the uniform time base
   MarkerKind kind = MarkerKind::kBeginning;
-  std::string cause;  ///< "motion", "touch onset", "touch release", "first sample", ...
+  std::string cause;  ///< "motion", "touch onset", "touch release", "first sample", "orientation",
+                      ///< "extremum of <joint>", ...
   double score = 0;   ///< how clearly the episode stands out: peak MSV over k c
 };
 
@@ -52,6 +53,10 @@ struct Segmentation {
   Eigen::VectorXd touch_term;  ///< c_tactile dw/dt (or its absolute value), or empty
   double c = 0;                ///< low-motion cut-off, Eq. 3
   double k = 0;                ///< ratio of high to low motion, Eq. 4
+  /// Of threshold=local, one a frame: c and c k there (c and k above are the whole trial's); else
+  /// empty.
+  Eigen::VectorXd c_along;
+  Eigen::VectorXd high_along;
   double c_tactile = 0;
   bool c_replaced = false;      ///< Eq. 3 was not positive; c came from the data
   std::vector<Marker> markers;  ///< beginnings and endings, in time order
@@ -63,13 +68,17 @@ struct AlignedTrial {
   UniformTrial own;  ///< on its own time
   Segmentation segmentation;
   std::vector<int> chosen;  ///< indices of the chosen beginnings within segmentation.markers
-  std::vector<double> own_knots_s;  ///< first sample, chosen markers, last sample
-  UniformTrial warped;              ///< all streams on the common time base
+  /// First sample, chosen markers, last sample; of alignment=elastic, as many as its grid has.
+  std::vector<double> own_knots_s;
+  UniformTrial warped;  ///< all streams on the common time base
 };
 
 struct Alignment {
   std::vector<double> time_s;   ///< the common time base, N frames from 0
-  std::vector<double> knots_s;  ///< mean marker times with start and end, on the common time base
+  std::vector<double> knots_s;  ///< means of the trials' own_knots_s, on the common time base
+  /// Mean times of the chosen markers with start and end on the common time base: the knots, but
+  /// for alignment=elastic.
+  std::vector<double> markers_s;
   std::vector<AlignedTrial> trials;
   Eigen::MatrixXd canonical_joints;  ///< mean of the warped trials, N x joints (or N x 0)
   Eigen::MatrixXd canonical_tool;    ///< N x 3 (or 0 x 3)
