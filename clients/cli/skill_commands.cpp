@@ -16,6 +16,7 @@ namespace {
 struct Words {
   std::string name, format, output, figures;
   int version = 0;
+  int count = 3;
   std::vector<std::string> options;
 };
 
@@ -101,6 +102,20 @@ int Versions(const Session& session, const Words& words) {
   return 0;
 }
 
+int Suggest(const Session& session, const Words& words) {
+  const Result<rpc::Clients> clients = session.Connect();
+  if (!clients) return FailUsage(clients.error());
+  const Result<learning::Suggestions> found =
+      clients->skills->Suggest(words.name, words.version, {.count = words.count});
+  if (!found) return Fail(found.error());
+  if (words.format == "json") {
+    Print(ToJson(*found));
+  } else {
+    std::cout << SuggestionsText(*found);
+  }
+  return 0;
+}
+
 int Rollback(const Session& session, const Words& words) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
@@ -146,7 +161,9 @@ void AddSkillCommands(Command& root, const Session& session) {
       skill, "learn",
       "Learns a skill's next version from all of its trials; prints what was found.\n\n"
       "Options: method=auto|paper|frames, selection=vote|joint, rule=twitch|literal,\n"
-      "force_rate=absolute|signed, target=OBJECT, leave_out=TRIAL,..., sample_rate_hz, cutoff_hz,\n"
+      "force_rate=absolute|signed, alignment=markers|elastic, threshold=trial|local,\n"
+      "cues=orientation,extrema, joints=suit|measured, target=OBJECT, leave_out=TRIAL,..., "
+      "sample_rate_hz, cutoff_hz,\n"
       "frames. Every default works without them. Ctrl-C stops and changes nothing.",
       {"exemplar skill learn press", "exemplar skill learn press --option method=paper"}, words);
   command.Option("--option", "NAME=VALUE", words->options, "may be given several times");
@@ -174,6 +191,17 @@ void AddSkillCommands(Command& root, const Session& session) {
                    {"exemplar skill versions press"}, words);
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] { return Versions(session, *words); });
+
+  words = std::make_shared<Words>();
+  command =
+      AddOne(skill, "suggest",
+             "Says where to demonstrate next: places of the object, among the trials' and\n"
+             "between them, at which the skill's answer is least certain",
+             {"exemplar skill suggest press", "exemplar skill suggest press --count 5"}, words);
+  AddVersion(command, *words);
+  command.Option("--count", "N", words->count, "how many places, 1 to 20 (default: 3)");
+  AddFormat(command, words->format, {"text", "json"});
+  command.Runs([&session, words] { return Suggest(session, *words); });
 
   words = std::make_shared<Words>();
   command = AddOne(skill, "rollback", "Makes another version the current one; nothing is lost",

@@ -24,16 +24,28 @@ std::string Line(const std::string& label, const std::string& value) {
   return "  " + label + std::string(kWidth - std::min(kWidth, label.size()), ' ') + value + '\n';
 }
 
-std::string ContactText(const learning::SkillReport& report) {
-  if (!report.contact_begin_s || !report.contact_end_s) return "none found";
-  const Eigen::Vector3d& p = report.target_p_contact;
-  return FormatFixed(*report.contact_begin_s, 2) + " to " + FormatFixed(*report.contact_end_s, 2) +
-         " s, at " + FormatFixed(1e3 * p.x(), 1) + " " + FormatFixed(1e3 * p.y(), 1) + " " +
-         FormatFixed(1e3 * p.z(), 1) + " mm in the frame of " + report.target + ", spread " +
-         FormatFixed(1e3 * report.contact_spread_m, 1) + " mm";
+std::string ContactText(const learning::SkillReport::ContactPart& contact) {
+  const Eigen::Vector3d& p = contact.object_p_contact;
+  return FormatFixed(contact.begin_s, 2) + " to " + FormatFixed(contact.end_s, 2) + " s, at " +
+         FormatFixed(1e3 * p.x(), 1) + " " + FormatFixed(1e3 * p.y(), 1) + " " +
+         FormatFixed(1e3 * p.z(), 1) + " mm in the frame of " + contact.object + ", spread " +
+         FormatFixed(1e3 * contact.spread_m, 1) + " mm";
 }
 
 }  // namespace
+
+std::string SuggestionsText(const learning::Suggestions& suggestions) {
+  if (suggestions.places.empty()) return "no place tells more than another\n";
+  std::string text = "demonstrate next with \"" + suggestions.places[0].target.name + "\" at\n";
+  Table places({"X (m)", "Y (m)", "Z (m)", "WHY"});
+  for (const learning::Suggestion& place : suggestions.places) {
+    const Eigen::Vector3d& p = place.target.base_T_object.translation;
+    places.Add({FormatFixed(p.x(), 3), FormatFixed(p.y(), 3), FormatFixed(p.z(), 3), place.reason});
+  }
+  text += places.Text(2);
+  for (const std::string& note : suggestions.notes) text += "note: " + note + '\n';
+  return text;
+}
 
 std::string ReportText(const learning::SkillReport& report) {
   std::string text = "skill " + report.skill + ", version " + std::to_string(report.version) + '\n';
@@ -46,7 +58,10 @@ std::string ReportText(const learning::SkillReport& report) {
   text += Line("markers", Seconds(report.markers_s) + " s");
   text += Line("correlation", FormatFixed(report.plain_correlation, 3) + " before alignment, " +
                                   FormatFixed(report.mean_correlation, 3) + " after");
-  text += Line("contact", ContactText(report));
+  if (report.contacts.empty()) text += Line("contact", "none found");
+  for (const learning::SkillReport::ContactPart& contact : report.contacts) {
+    text += Line("contact", ContactText(contact));
+  }
 
   text += "trials\n";
   Table trials({"TRIAL", "SOURCE", "SECONDS", "CANDIDATES", "MARKERS (s)", "TARGET AT (m)"});

@@ -31,6 +31,7 @@ nlohmann::json ToJson(const api::TrialInfo& info);
 nlohmann::json ToJson(const api::TrialSegments& segments);
 nlohmann::json ToJson(const api::SkillInfo& info);
 nlohmann::json ToJson(const api::VersionInfo& info);
+nlohmann::json ToJson(const learning::Suggestions& suggestions);
 nlohmann::json ToJson(const demonstration::SkillQuery& query);
 nlohmann::json ToJson(const demonstration::SkillMotion& motion);
 nlohmann::json ToJson(const learning::Evaluation& evaluation);

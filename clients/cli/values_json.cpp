@@ -96,7 +96,22 @@ json ToJson(const api::TrialSegments& segments) {
           {"markers", FromList(segmentation.markers, FromMarker)},
           {"time_s", segments.time_s},
           {"msv", FromVector(segmentation.msv)},
-          {"touch_term", FromVector(segmentation.touch_term)}};
+          {"touch_term", FromVector(segmentation.touch_term)},
+          {"c_along", FromVector(segmentation.c_along)},
+          {"high_along", FromVector(segmentation.high_along)}};
+}
+
+json ToJson(const learning::Suggestions& suggestions) {
+  json places = json::array();
+  for (const learning::Suggestion& place : suggestions.places) {
+    places.push_back({{"target", ToJson(place.target)},
+                      {"sigma_m", place.sigma_m},
+                      {"nearest_trial_m", place.nearest_trial_m},
+                      {"reason", place.reason}});
+  }
+  return {{"places", std::move(places)},
+          {"typical_sigma_m", suggestions.typical_sigma_m},
+          {"notes", suggestions.notes}};
 }
 
 json ToJson(const api::SkillInfo& info) {

@@ -24,7 +24,7 @@ BINARIES = pathlib.Path(os.environ["EXEMPLAR_BIN"])
 DONE, OTHER, USAGE, NOT_FOUND, REFUSED, UNAVAILABLE = 0, 1, 2, 3, 4, 5
 COMMANDS = {
     "trial": ["submit", "list", "show", "segments", "export", "delete"],
-    "skill": ["learn", "list", "show", "versions", "rollback", "delete", "query", "evaluate", "execute", "export"],
+    "skill": ["learn", "list", "show", "versions", "suggest", "rollback", "delete", "query", "evaluate", "execute", "export"],
     "robot": ["status", "pause", "resume", "cancel", "stop", "reset", "speed"],
     "record": ["start", "stop", "pause", "resume", "status", "info", "recover"],
 }
@@ -383,6 +383,31 @@ class ServiceTest(unittest.TestCase):
         self.assertEqual(self.exemplar("skill", "delete", "versions").returncode, DONE)
         self.assertEqual(self.exemplar("skill", "versions", "versions").returncode, NOT_FOUND)
         self.assertEqual(len(self.json("trial", "list", *skill)), 5)
+
+    def test_suggest_says_where_to_demonstrate_next(self):
+        found = self.json("skill", "suggest", "press", "--count", 2)
+        self.assertIn(len(found["places"]), (1, 2))
+        self.assertEqual(found["places"][0]["target"]["name"], "button")
+        self.assertGreater(found["places"][0]["nearest_trial_m"], 0)
+        text = self.exemplar("skill", "suggest", "press").stdout
+        self.assertIn('demonstrate next with "button" at', text)
+        self.assertIn("the nearest trial is", text)
+        wrong = self.exemplar("skill", "suggest", "press", "--count", 99)
+        self.assertEqual(wrong.returncode, REFUSED)
+        self.assertIn("count is 99", wrong.stderr)
+        self.assertEqual(self.exemplar("skill", "suggest", "nothing").returncode, NOT_FOUND)
+
+    def test_segments_takes_the_options_of_segmentation(self):
+        options = ["--option", "threshold=local", "--option", "cues=extrema,orientation"]
+        found = self.json("trial", "segments", self.files[0], *options)
+        self.assertEqual(len(found["c_along"]), len(found["msv"]))
+        plain = self.json("trial", "segments", self.files[0])
+        self.assertEqual(plain["c_along"], [])
+        self.assertGreater(len(found["markers"]), len(plain["markers"]))
+        self.assertTrue(all(marker["cause"] and marker["score"] > 0 for marker in found["markers"]))
+        wrong = self.exemplar("trial", "segments", self.files[0], "--option", "cues=smell")
+        self.assertEqual(wrong.returncode, REFUSED)
+        self.assertIn("orientation, extrema", wrong.stderr)
 
     def test_tables_are_aligned(self):
         for words in (["trial", "list"], ["skill", "list"], ["skill", "versions", "press"]):

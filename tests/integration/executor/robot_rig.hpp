@@ -44,6 +44,10 @@ class PressSkill final : public api::SkillApi {
                                         std::string) override {
     return Internal("not asked here");
   }
+  Result<learning::Suggestions> Suggest(const std::string&, int,
+                                        const learning::SuggestOptions&) override {
+    return Internal("not asked here");
+  }
   Result<std::string> ExportJson(const std::string&, int) override { return std::string("{}"); }
 
   Result<demonstration::SkillMotion> Query(const std::string& name, int,

@@ -195,6 +195,10 @@ TEST(Claims, TwoPressesInOneTrialMeetTheirButtons) {
   ASSERT_EQ(motion.contacts.size(), 2u);
   EXPECT_EQ(motion.contacts[0].object, "left");
   EXPECT_EQ(motion.contacts[1].object, "right");
+  ASSERT_EQ(skill.report().contacts.size(), 2u);
+  EXPECT_EQ(skill.report().contacts[0].object, "left");
+  EXPECT_EQ(skill.report().contacts[1].object, "right");
+  EXPECT_LT(skill.report().contacts[0].end_s, skill.report().contacts[1].begin_s);
   for (std::size_t k = 0; k < 2; ++k) {
     const Vector3d& button = query.objects[k].base_T_object.translation;
     EXPECT_LT((ToolAt(motion, Middle(motion.contacts[k])) - button).norm(), 2e-3) << k;

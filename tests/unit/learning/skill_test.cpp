@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "exemplar/learning/inspection.hpp"
 #include "pressing_arm.hpp"
 
 namespace exemplar::learning {
@@ -120,6 +121,76 @@ TEST(PaperMethod, AnswersATrialsOwnPlaceWithTheTrial) {
     ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
     EXPECT_LT(evaluation->deviation.frechet_m, .01);
     EXPECT_LT(evaluation->deviation.end_error_m, 1e-3);
+  }
+}
+
+TEST(PaperMethod, SaysThatItDoesNotUseTheStart) {
+  const Skill skill = Learn(MakePresses(4), Method::kPaper);
+  SkillQuery query = ButtonAt(ButtonPlaces()[0]);
+  EXPECT_THAT(Ask(skill, query).warnings, testing::IsEmpty());
+  query.start = geometry::Pose{Ask(skill, query).base_T_tool[0].translation + Vector3d(0, .03, 0),
+                               Ask(skill, query).base_T_tool[0].rotation};
+  EXPECT_THAT(Ask(skill, query).warnings,
+              testing::ElementsAre(
+                  HasSubstr("method=paper does not use the start: the motion begins 0.030 m")));
+}
+
+TEST(PaperMethod, SaysThatTrialsWithoutJointsGiveAPlainRbfOnPaths) {
+  const Skill paths = Learn(MakePresses(4, {.joints = false}), Method::kPaper);
+  EXPECT_THAT(paths.report().notes,
+              Contains(HasSubstr("the paper's method is a plain RBF on paths")));
+  const Skill joints = Learn(MakePresses(4), Method::kPaper);
+  EXPECT_THAT(joints.report().notes, testing::Not(Contains(HasSubstr("plain RBF"))));
+}
+
+// PAPER.md section 5.4: x_final = x_absolute + Upsilon (x_object - x_absolute), at every frame.
+TEST(PaperMethod, BlendsBothSolutionsByObjectivity) {
+  const Skill skill = Learn(MakePresses(6), Method::kPaper);
+  const Vector3d place(.6, .05, .2);
+  const SkillMotion motion = Ask(skill, ButtonAt(place));
+  const std::optional<InspectedQuery> paths = InspectAt(skill, place);
+  ASSERT_TRUE(paths.has_value());
+  double apart = 0;
+  for (std::size_t i = 0; i < motion.base_T_tool.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const Eigen::RowVector3d absolute = paths->absolute.row(row);
+    const Eigen::RowVector3d objective = paths->objective.row(row);
+    const Eigen::RowVector3d blended =
+        absolute + motion.objectivity(row, 0) * (objective - absolute);
+    EXPECT_LT((blended.transpose() - motion.base_T_tool[i].translation).norm(), 1e-12);
+    apart = std::max(apart, (objective - absolute).norm());
+  }
+  EXPECT_GT(apart, 1e-3);
+}
+
+TEST(PaperMethod, LastsAsLongAsTheTrialsOnAverage) {
+  const std::vector<NamedTrial> trials = MakePresses(5);
+  double mean_s = 0;
+  for (const NamedTrial& trial : trials) mean_s += trial.trial.duration_s() / 5;
+  const SkillMotion motion = Ask(Learn(trials, Method::kPaper), ButtonAt(ButtonPlaces()[1]));
+  EXPECT_NEAR(motion.time_s.back(), mean_s, 1e-9);
+}
+
+// Eq. 3 is not positive for a trial that rests nearly all the time.
+TEST(LearnSkill, SaysWhereTheCutOffHadToComeFromTheData) {
+  std::vector<NamedTrial> trials = MakePresses(2);
+  for (NamedTrial& named : trials) {
+    demonstration::Trial& trial = named.trial;
+    for (double& t : trial.joints.time_s) t += 20;
+    trial.joints.time_s.front() = 0;
+    trial.tactile.time_s = trial.joints.time_s;
+  }
+  LearnOptions options;
+  options.method = Method::kPaper;
+  const Result<Skill> skill = LearnSkill(trials, options, kArm);
+  ASSERT_TRUE(skill.ok()) << skill.error().message;
+  for (const SkillReport::TrialPart& part : skill->report().trials) {
+    EXPECT_THAT(part.notes, Contains(HasSubstr("c of Eq. 3 is not positive")));
+    EXPECT_GT(part.c, 0);
+  }
+  const Skill usual = Learn(MakePresses(2), Method::kPaper);
+  for (const SkillReport::TrialPart& part : usual.report().trials) {
+    EXPECT_THAT(part.notes, testing::Not(Contains(HasSubstr("Eq. 3"))));
   }
 }
 
@@ -328,6 +399,28 @@ TEST(Answer, PredictsALargerErrorFurtherFromTheTrials) {
     return motion.sigma_m[motion.sigma_m.size() / 4];
   };
   EXPECT_LT(sigma(Vector3d(.6, 0, .2)), sigma(Vector3d(.9, .6, .6)));
+}
+
+TEST(SkillJson, AnElasticAlignmentReadsBackAndKeepsItsMarkers) {
+  LearnOptions options;
+  options.alignment = AlignmentRule::kElastic;
+  options.threshold = ThresholdRule::kLocal;
+  const Result<Skill> learned = LearnSkill(MakePresses(4), options, kArm);
+  ASSERT_TRUE(learned.ok());
+  EXPECT_GT(learned->alignment().knots_s.size(), 50u);
+  EXPECT_EQ(learned->report().markers_s.size(), learned->alignment().trials[0].chosen.size() + 2);
+  const Result<Skill> again = SkillFromJson(ToJson(*learned), kArm);
+  ASSERT_TRUE(again.ok());
+  const SkillQuery query = ButtonAt(Vector3d(.6, 0, .2));
+  const SkillMotion motion = Ask(*learned, query);
+  const SkillMotion same = Ask(*again, query);
+  EXPECT_EQ(motion.markers_s, same.markers_s);
+  EXPECT_EQ(motion.markers_s, learned->report().markers_s);
+  EXPECT_EQ(EndError(motion, same), 0);
+  EXPECT_LT(ContactError(motion, Vector3d(.6, 0, .2)), 2e-3);
+  EXPECT_EQ(again->alignment().trials[0].segmentation.high_along,
+            learned->alignment().trials[0].segmentation.high_along);
+  EXPECT_EQ(again->report().contacts.size(), learned->report().contacts.size());
 }
 
 TEST(SkillJson, ReadBackAnswersTheSame) {

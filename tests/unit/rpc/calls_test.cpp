@@ -151,6 +151,19 @@ class ScriptedSkills final : public api::SkillApi {
     evaluation.deviation.frechet_m = static_cast<double>(file.size());
     return evaluation;
   }
+  Result<learning::Suggestions> Suggest(const std::string& name, int version,
+                                        const learning::SuggestOptions& options) override {
+    learning::Suggestions suggestions;
+    for (int k = 0; k < options.count; ++k) {
+      suggestions.places.push_back({.target = {name, geometry::Pose::Identity(), true},
+                                    .sigma_m = 0.01 * version,
+                                    .nearest_trial_m = 0.2,
+                                    .reason = "a gap"});
+    }
+    suggestions.typical_sigma_m = 0.004;
+    suggestions.notes = {"never turned"};
+    return suggestions;
+  }
   Result<std::string> ExportJson(const std::string&, int) override { return std::string("{}"); }
 
   Gate learning_began, learning_stopped;
@@ -399,6 +412,15 @@ TEST_F(CallsTest, SkillCallsArriveWithTheirArguments) {
   EXPECT_EQ(clients_.skills->Versions("press")->size(), 3u);
   EXPECT_TRUE(clients_.skills->Rollback("press", 4).ok());
   EXPECT_EQ(skills_.rolled_back_to, 4);
+  const auto suggested = clients_.skills->Suggest("press", 2, {.count = 4});
+  ASSERT_TRUE(suggested.ok()) << suggested.error().message;
+  ASSERT_EQ(suggested->places.size(), 4u);
+  EXPECT_EQ(suggested->places[3].target.name, "press");
+  EXPECT_EQ(suggested->places[3].sigma_m, 0.02);
+  EXPECT_EQ(suggested->places[3].nearest_trial_m, 0.2);
+  EXPECT_EQ(suggested->places[3].reason, "a gap");
+  EXPECT_EQ(suggested->typical_sigma_m, 0.004);
+  EXPECT_EQ(suggested->notes.at(0), "never turned");
   EXPECT_TRUE(clients_.skills->Delete("press").ok());
   EXPECT_EQ(*clients_.skills->ExportJson("press", 1), "{}");
 }

@@ -165,6 +165,15 @@ TEST(ConvertSkill, ReportsComeBack) {
     EXPECT_EQ(back->duration_s, report.duration_s);
     EXPECT_EQ(back->joint_names, report.joint_names);
     EXPECT_EQ(back->markers_s, report.markers_s);
+    ASSERT_EQ(back->contacts.size(), report.contacts.size());
+    for (std::size_t c = 0; c < report.contacts.size(); ++c) {
+      EXPECT_EQ(back->contacts[c].object, report.contacts[c].object);
+      EXPECT_EQ(back->contacts[c].begin_s, report.contacts[c].begin_s);
+      EXPECT_EQ(back->contacts[c].end_s, report.contacts[c].end_s);
+      EXPECT_EQ(back->contacts[c].object_p_contact, report.contacts[c].object_p_contact);
+      EXPECT_EQ(back->contacts[c].spread_m, report.contacts[c].spread_m);
+      EXPECT_EQ(back->contacts[c].touch_measured, report.contacts[c].touch_measured);
+    }
     EXPECT_EQ(back->contact_begin_s, report.contact_begin_s);
     EXPECT_EQ(back->contact_end_s, report.contact_end_s);
     EXPECT_EQ(back->target_p_contact, report.target_p_contact);

@@ -64,6 +64,8 @@ TEST(ConvertTrial, SegmentsComeBack) {
   segments.segmentation.k = 2.5;
   segments.segmentation.c_tactile = 3.5;
   segments.segmentation.c_replaced = true;
+  segments.segmentation.c_along = RandomVector(rng, 9);
+  segments.segmentation.high_along = RandomVector(rng, 9);
   segments.segmentation.markers = {{.time_s = 0.1,
                                     .frame = 6,
                                     .kind = learning::MarkerKind::kBeginning,
@@ -86,6 +88,8 @@ TEST(ConvertTrial, SegmentsComeBack) {
   EXPECT_EQ(back->segmentation.k, 2.5);
   EXPECT_EQ(back->segmentation.c_tactile, 3.5);
   EXPECT_TRUE(back->segmentation.c_replaced);
+  EXPECT_EQ(back->segmentation.c_along, segments.segmentation.c_along);
+  EXPECT_EQ(back->segmentation.high_along, segments.segmentation.high_along);
   ASSERT_EQ(back->segmentation.markers.size(), 2u);
   EXPECT_EQ(back->segmentation.markers[1].kind, learning::MarkerKind::kEnding);
   EXPECT_EQ(back->segmentation.markers[1].time_s, 0.5);

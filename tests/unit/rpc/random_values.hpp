@@ -85,6 +85,7 @@ inline demonstration::Trial RandomTrial(Rng& rng) {
   trial.start = RandomStamp(rng);
   trial.joints = RandomScalars(rng);
   trial.prismatic_joints = RandomTexts(rng, 2);
+  trial.measured_joints = RandomScalars(rng);
   trial.end_effectors = {RandomPoseSeries(rng), RandomPoseSeries(rng)};
   trial.objects = {RandomPoseSeries(rng)};
   trial.hands = RandomScalars(rng);
@@ -167,6 +168,14 @@ inline learning::SkillReport RandomReport(Rng& rng) {
   report.markers_s = RandomNumbers(rng, 2);
   if (RandomBool(rng)) report.contact_begin_s = rng.Uniform();
   if (RandomBool(rng)) report.contact_end_s = rng.Uniform();
+  for (int i = 0; i < 2; ++i) {
+    report.contacts.push_back({.object = RandomText(rng),
+                               .begin_s = rng.Uniform(),
+                               .end_s = rng.Uniform(),
+                               .object_p_contact = RandomVector(rng, 3),
+                               .spread_m = rng.Uniform(),
+                               .touch_measured = RandomBool(rng)});
+  }
   report.target_p_contact = RandomVector(rng, 3);
   report.contact_spread_m = rng.Uniform();
   report.mean_correlation = rng.Uniform();

@@ -37,6 +37,11 @@ void ReportTrials(const Alignment& alignment, const Exemplars& exemplars, SkillR
     part.c = aligned.segmentation.c;
     part.k = aligned.segmentation.k;
     part.cutoff_hz = aligned.own.cutoff_hz;
+    if (aligned.segmentation.c_replaced) {
+      part.notes.push_back(
+          "c of Eq. 3 is not positive (the deviation of the MSV is twice its mean or more): " +
+          FormatDouble(part.c) + " was taken from the data");
+    }
     if (exemplars.target >= 0) {
       part.base_T_target =
           exemplars.trials[j].situation.base_T_object[static_cast<std::size_t>(exemplars.target)];
@@ -49,14 +54,22 @@ void ReportContact(const Skill::Data& data, SkillReport& report) {
   const Exemplars& exemplars = *data.exemplars;
   for (std::size_t k = 0; k < exemplars.contacts.size(); ++k) {
     const ContactSpan& contact = exemplars.contacts[k];
-    if (contact.object != exemplars.target) continue;
-    report.contact_begin_s = data.alignment->time_s[static_cast<std::size_t>(contact.first)];
-    report.contact_end_s = data.alignment->time_s[static_cast<std::size_t>(contact.last)];
-    if (!exemplars.has_tool) return;
-    report.target_p_contact = data.contact_points[k].object_p_contact;
-    report.contact_spread_m = data.contact_points[k].spread_m;
-    return;
+    SkillReport::ContactPart& part = report.contacts.emplace_back();
+    part.object = exemplars.object_names[static_cast<std::size_t>(contact.object)];
+    part.begin_s = data.alignment->time_s[static_cast<std::size_t>(contact.first)];
+    part.end_s = data.alignment->time_s[static_cast<std::size_t>(contact.last)];
+    part.touch_measured = contact.touch_measured;
+    if (exemplars.has_tool) {
+      part.object_p_contact = data.contact_points[k].object_p_contact;
+      part.spread_m = data.contact_points[k].spread_m;
+    }
+    if (contact.object != exemplars.target || report.contact_begin_s.has_value()) continue;
+    report.contact_begin_s = part.begin_s;
+    report.contact_end_s = part.end_s;
+    report.target_p_contact = part.object_p_contact;
+    report.contact_spread_m = part.spread_m;
   }
+  if (report.contact_begin_s.has_value()) return;
   if (exemplars.target >= 0 && exemplars.has_tool) {
     report.warnings.push_back(
         "no contact was found: no touch was measured and the paths do not converge in the frame of "
@@ -232,7 +245,7 @@ Result<Skill> LearnSkill(std::span<const NamedTrial> trials, const LearnOptions&
   report.duration_s = alignment->time_s.back();
   report.mean_correlation = alignment->mean_correlation;
   report.plain_correlation = alignment->plain_correlation;
-  report.markers_s = alignment->knots_s;
+  report.markers_s = alignment->markers_s;
   report.warnings.insert(report.warnings.end(), alignment->warnings.begin(),
                          alignment->warnings.end());
   Exemplars exemplars = BuildExemplars(*alignment, options.target, tool.get());

@@ -1,5 +1,6 @@
 #include "client_call.hpp"
 #include "convert_skill.hpp"
+#include "convert_suggest.hpp"
 #include "exemplar/v1/skill.grpc.pb.h"
 
 namespace exemplar::rpc {
@@ -92,6 +93,16 @@ class SkillClient final : public api::SkillApi {
     const auto response = Call(*connection_, stub_, &Stub::Query, request);
     if (!response) return response.error();
     return FromProto(response->motion(), "motion");
+  }
+
+  Result<learning::Suggestions> Suggest(const std::string& name, int version,
+                                        const learning::SuggestOptions& options) override {
+    v1::SuggestSkillRequest request;
+    Name(name, version, request.mutable_skill());
+    request.set_count(options.count);
+    const auto response = Call(*connection_, stub_, &Stub::Suggest, request);
+    if (!response) return response.error();
+    return FromProto(*response);
   }
 
   Result<learning::Evaluation> Evaluate(const std::string& name, int version,

@@ -14,6 +14,7 @@
 #include "exemplar/demonstration/motion.hpp"
 #include "exemplar/demonstration/trial.hpp"
 #include "exemplar/learning/skill.hpp"
+#include "exemplar/learning/suggest.hpp"
 
 namespace exemplar::api {
 
@@ -102,6 +103,9 @@ class SkillApi {
   /// Against a trial file that is not part of the skill.
   virtual Result<learning::Evaluation> Evaluate(const std::string& name, int version,
                                                 const std::string& file_name, std::string file) = 0;
+  /// Where another demonstration would tell most.
+  virtual Result<learning::Suggestions> Suggest(const std::string& name, int version,
+                                                const learning::SuggestOptions& options) = 0;
   /// The skill as a JSON document: learning::ToJson(skill) with its "inspection" beside it. Figures
   /// are drawn from it.
   virtual Result<std::string> ExportJson(const std::string& name, int version) = 0;

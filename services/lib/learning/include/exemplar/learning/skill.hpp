@@ -46,6 +46,16 @@ struct SkillReport {
   };
   std::vector<TrialPart> trials;
   std::vector<double> markers_s;  ///< common time
+  /// A meeting of the tool with an object, on the common time.
+  struct ContactPart {
+    std::string object;
+    double begin_s = 0, end_s = 0;
+    Eigen::Vector3d object_p_contact = Eigen::Vector3d::Zero();  ///< mean, in the object's frame
+    double spread_m = 0;
+    bool touch_measured = false;
+  };
+  std::vector<ContactPart> contacts;  ///< all, in time order
+  /// Of the first one with the target; the same for the two members that follow.
   std::optional<double> contact_begin_s, contact_end_s;
   Eigen::Vector3d target_p_contact =
       Eigen::Vector3d::Zero();  ///< mean contact point in the target's frame
@@ -103,5 +113,12 @@ nlohmann::json ToJson(const SkillReport& report);
 nlohmann::json ToJson(const Skill& skill);
 Result<Skill> SkillFromJson(const nlohmann::json& json,
                             std::shared_ptr<const demonstration::ToolKinematics> tool = nullptr);
+
+/// For storage: the JSON document in CBOR, its arrays of numbers as bytes of doubles.
+/// SkillFromBytes also reads CBOR that has them as arrays, as versions up to 0.1 wrote it;
+/// kDataLoss for what is neither.
+std::string ToBytes(const Skill& skill);
+Result<Skill> SkillFromBytes(std::string_view bytes,
+                             std::shared_ptr<const demonstration::ToolKinematics> tool = nullptr);
 
 }  // namespace exemplar::learning
