@@ -11,6 +11,7 @@
 
 #include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/ircp/clock_watch.hpp"
 #include "support/dds_domain.hpp"
 #include "support/eventually.hpp"
 
@@ -296,6 +297,88 @@ TEST(ParticipantTest, RefusesOptionsThatNameNothing) {
   EXPECT_EQ(error_field({.station = "lab*"}), "station");
   EXPECT_EQ(error_field({.interfaces = {"no-such-interface"}}), "interfaces");
   EXPECT_EQ(error_field({.peers = {"not an address"}}), "peers");
+}
+
+TEST_F(BusTest, TopicsThatAreConfiguredSoGoBestEffortAndTapsReadThemToo) {
+  const ParticipantOptions options{.best_effort_topics = {"ircp/joint_state"}};
+  const auto robot = Join("lab", options);
+  const auto executor = Join("lab", options);
+  const auto recorder = Join("lab");
+  Inbox<ircp::JointStateSample> inbox;
+  const auto reader = ReaderOf<ircp::JointStateSample>(*executor, inbox.callback());
+  const auto writer = WriterOf<ircp::JointStateSample>(*robot, "robot");
+  std::atomic<int> taken = 0;
+  std::atomic<bool> reliable = true;
+  ircp::RawTapOptions tapping;
+  tapping.on_topic = [&](const ircp::RawTopic& topic) { reliable = topic.reliable; };
+  tapping.on_sample = [&](ircp::RawSample&&) { ++taken; };
+  const auto tap = recorder->MakeTap(tapping);
+  ASSERT_TRUE(tap.ok());
+  ASSERT_TRUE(Eventually([&] { return writer->matched_readers() == 2; }));
+  ASSERT_TRUE(Eventually([&] { return (*tap)->matched_writers("ircp/joint_state") == 1; }));
+  ircp::JointStateSample sample;
+  sample.names = {"elbow"};
+  sample.positions = {0.5};
+  ASSERT_TRUE(Eventually([&] {
+    EXPECT_TRUE(writer->Write(sample).ok());
+    return inbox.size() > 0 && taken > 0;
+  }));
+  EXPECT_FALSE(reliable);
+}
+
+TEST_F(BusTest, RefusesADiscoveryServerThatIsNoAddress) {
+  for (const char* address :
+       {"nowhere", "10.0.0.1", "10.0.0.1:0", "10.0.0.1:70000", ":11811", ""}) {
+    ParticipantOptions options{.domain = domain_.number(), .discovery_servers = {address}};
+    const auto participant = Participant::Create(options);
+    ASSERT_FALSE(participant.ok()) << address;
+    EXPECT_THAT(participant.error().message, ::testing::HasSubstr(address));
+  }
+}
+
+TEST_F(BusTest, ClocksAreComparedOverTheNetwork) {
+  /// Runs ahead of the machine's.
+  class AheadClock final : public Clock {
+   public:
+    Stamp Now() const override { return clock_.Now() + std::chrono::seconds(5); }
+    Duration Steady() const override { return clock_.Steady(); }
+    bool SleepUntil(Duration steady, std::stop_token stop) const override {
+      return clock_.SleepUntil(steady, std::move(stop));
+    }
+
+   private:
+    SystemClock clock_;
+  };
+  const AheadClock ahead;
+  const SystemClock clock;
+  NullLog log;
+  const auto suit = Join("lab", {.clock = &ahead});
+  const auto recorder = Join("lab", {.clock = &clock});
+  const auto responder = ircp::ClockResponder::Create(*suit, ahead, "capture_suit");
+  const auto watch = ircp::ClockWatch::Create(*recorder, clock, log, "recorder");
+  ASSERT_TRUE(responder.ok() && watch.ok());
+  ASSERT_TRUE(Eventually([&] {
+    const auto relations = (*watch)->relations();
+    return !relations.empty() && relations[0].exchanges >= 4;
+  }));
+  const auto writer = WriterOf<ircp::SuitSample>(*suit, "suit");
+  std::mutex mutex;
+  std::string name;
+  const auto reader = ReaderOf<ircp::SuitSample>(
+      *recorder, [&](const ircp::SuitSample&, const Reception& reception) {
+        const std::lock_guard lock(mutex);
+        name = reception.writer;
+      });
+  ASSERT_TRUE(Eventually([&] { return writer->matched_readers() == 1; }));
+  ASSERT_TRUE(writer->Write(Suit(1)).ok());
+  ASSERT_TRUE(Eventually([&] {
+    const std::lock_guard lock(mutex);
+    return !name.empty();
+  }));
+  const ircp::ClockRelation relation = (*watch)->relations().at(0);
+  EXPECT_EQ(relation.program, "capture_suit");
+  EXPECT_EQ(relation.participant, ircp::ParticipantOf(name));
+  EXPECT_LE(std::chrono::abs(relation.offset - std::chrono::seconds(5)), relation.uncertainty);
 }
 
 }  // namespace
