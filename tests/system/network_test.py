@@ -1,8 +1,10 @@
-"""Capture and recorder on two machines: network namespaces joined by a bridge that loses packets and is cut.
+"""Capture and recorders on two machines: network namespaces joined by a bridge that loses packets and is cut.
 
 Needs the right to make namespaces and bridges, and iptables with its statistic match; skips where it has not.
 """
 
+import csv
+import json
 import os
 import pathlib
 import shutil
@@ -16,6 +18,12 @@ import trials
 from processes import exemplar, wait_for
 
 TOPIC = "ircp/end_effector"
+DOMAIN = 94
+STRANGERS = pathlib.Path(__file__).resolve().parent / "strangers"
+IDL = processes.ROOT / "idl"
+FAKETIME = pathlib.Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
+DISCOVERY_SERVER = "/usr/bin/fast-discovery-server"
+KEPT = 3000  # samples of the topic that a writer keeps (docs/topics.md)
 
 
 class Machine:
@@ -80,22 +88,63 @@ class NetworkCase(unittest.TestCase):
         except (OSError, FileNotFoundError) as error:
             self.skipTest(f"no bridged namespaces here: {error}")
         self.capture_machine, self.recorder_machine = self.machines
-        self.programs = processes.Programs(self.folder, 94)
+        self.programs = processes.Programs(self.folder, DOMAIN)
         self.addCleanup(self.programs.end)
         self.trial = trials.write_set(self.folder / "trials", [(0.55, -0.20, 0.06)])[0]
         with open(self.trial, encoding="utf-8") as stream:
             self.samples = sum(1 for _ in stream) - 1
 
-    def start_recorder(self):
-        return self.programs.recorder("--expect", TOPIC, prefix=self.recorder_machine.prefix)
+    def start_recorder(self, *words):
+        return self.programs.recorder("--expect", TOPIC, *words, prefix=self.recorder_machine.prefix)
+
+    def start_capture(self, trial, rate, *words):
+        return self.programs.start("exemplar-capture-suit", "--replay", trial, "--rate", rate, *words, prefix=self.capture_machine.prefix)
 
     def at_recorder(self, *words):
         return exemplar(*words, prefix=self.recorder_machine.prefix)
 
-    def record(self, during, rate="1"):
+    def cut(self):
+        run("ip", "link", "set", self.capture_machine.name, "down")
+
+    def restore(self):
+        run("ip", "link", "set", self.capture_machine.name, "up")
+
+    def long_trial(self, rows):
+        """A trial file of so many rows: the first one's, over and over."""
+        with open(self.trial, encoding="utf-8", newline="") as stream:
+            header, *first = list(csv.reader(stream))
+        path = self.folder / "long.csv"
+        with open(path, "w", encoding="utf-8", newline="") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(header)
+            for number in range(rows):
+                writer.writerow([f"{number / trials.RATE_HZ:.9g}", *first[number % len(first)][1:]])
+        return path
+
+    def cyclone_reader(self, last, quiet_s=10):
+        """A reader of another middleware on the recorder's machine, which counts for itself; begins to read what is being sent."""
+        if not shutil.which("idlc") or not pathlib.Path("/usr/include/dds/dds.h").exists():
+            self.skipTest("cyclonedds-dev and cyclonedds-tools are not installed")
+        for name in ("common", "end_effector"):
+            subprocess.run(["idlc", "-l", "c", "-I", IDL, IDL / f"{name}.idl"], cwd=self.folder, check=True)
+        program = self.folder / "reader"
+        sources = [STRANGERS / "reader.c", self.folder / "end_effector.c", self.folder / "common.c"]
+        subprocess.run(["gcc", "-I", self.folder, *sources, "-lddsc", "-o", program], check=True)
+        command = [*self.recorder_machine.prefix, program, DOMAIN, "test", last, quiet_s]
+        reader = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+        self.programs.running.append(reader)
+        self.assertEqual(reader.stdout.readline(), "first\n", self.programs.logs())
+        return reader
+
+    def counts_of(self, reader):
+        self.assertEqual(reader.wait(30), 0)
+        with reader.stdout as stream:
+            return json.load(stream)
+
+    def record(self, during, rate="1", words=()):
         """Records one replay while `during` is done to the network; the file's end-effector messages."""
-        _, server = self.start_recorder()
-        capture = self.programs.start("exemplar-capture-suit", "--replay", self.trial, "--rate", rate, prefix=self.capture_machine.prefix)
+        _, server = self.start_recorder(*words)
+        capture = self.start_capture(self.trial, rate, *words)
         self.at_recorder("record", "start", "--name", "t", "--topic", TOPIC, "--wait", "30", "--server", server)
         during(server)
         self.assertEqual(capture.wait(60), 0, self.programs.logs())
@@ -117,12 +166,82 @@ class NetworkCase(unittest.TestCase):
 
 
 class NetworkTest(NetworkCase):
-    def test_nothing_is_lost_at_20_percent_packet_loss(self):
+    def test_nothing_is_lost_at_20_percent_packet_loss_as_another_middleware_finds_too(self):
         for machine in self.machines:
             machine.lose(0.2)
-        figures, recorded = self.record(lambda server: None)
+        readers = []
+        figures, recorded = self.record(lambda server: readers.append(self.cyclone_reader(self.samples)))
         self.check_whole(figures, recorded)
         self.assertGreater(self.recorder_machine.dropped(), 20)
+        counts = self.counts_of(readers[0])
+        self.assertEqual(counts["last"], self.samples)
+        self.assertEqual(counts["missing"], 0, self.programs.logs())
+
+    def test_a_cut_across_the_trials_end_loses_only_what_the_history_does_not_keep(self):
+        rows = 2 * KEPT
+        rate = 10
+        _, server = self.start_recorder()
+        capture = self.start_capture(self.long_trial(rows), rate)
+        self.at_recorder("record", "start", "--name", "t", "--topic", TOPIC, "--wait", "30", "--server", server)
+        reader = self.cyclone_reader(rows, quiet_s=15)
+        self.cut()
+        time.sleep(rows / trials.RATE_HZ / rate)
+        self.assertIsNone(capture.poll())  # waits for those who have not all of it
+        self.restore()
+        self.assertEqual(capture.wait(40), 0, self.programs.logs())
+        wait_for(lambda: self.topic(server)["sent"] >= rows, "the last number")
+        figures = self.topic(server)
+        self.at_recorder("record", "stop", "--server", server)
+        before = figures["received"] - KEPT
+        self.assertGreater(before, 0, self.programs.logs())
+        self.assertEqual(figures["lost"], rows - KEPT - before)
+        self.assertGreater(figures["lost"], 0)
+        counts = self.counts_of(reader)
+        self.assertEqual(counts["last"], rows)
+        self.assertLess(abs(counts["missing"] - figures["lost"]), 2)  # the cut may fall between the two's packets
+
+    def test_two_recorders_with_wrong_clocks_make_one_trial_on_one_time_base(self):
+        if not FAKETIME.exists():
+            self.skipTest("faketime is not installed")
+        wrong = ("env", f"LD_PRELOAD={FAKETIME}", "DONT_FAKE_MONOTONIC=1", "FAKETIME=+7.5s x1.0002")
+        recorders = [
+            self.programs.recorder("--expect", TOPIC, prefix=self.capture_machine.prefix),
+            self.programs.recorder("--expect", TOPIC, prefix=(*self.recorder_machine.prefix, *wrong)),
+        ]
+        capture = self.start_capture(self.trial, "1")
+        for number, (machine, (_, server)) in enumerate(zip(self.machines, recorders)):
+            exemplar("record", "start", "--name", f"t{number}", "--topic", TOPIC, "--wait", "30", "--server", server, prefix=machine.prefix)
+        self.assertEqual(capture.wait(60), 0, self.programs.logs())
+        for machine, (_, server) in zip(self.machines, recorders):
+            exemplar("record", "stop", "--server", server, prefix=machine.prefix)
+        files = [self.folder / "data" / f"t{number}.mcap" for number in (0, 1)]
+        clocks = {clock["program"]: clock for clock in exemplar("record", "info", files[1])["clocks"]}
+        suit = clocks["capture_suit"]
+        self.assertLess(abs(suit["offset_s"] + 7.5), suit["uncertainty_s"] + 0.01)  # and what the wrong clock has gained
+        self.assertEqual(suit["jumps"], 0)
+        joined = exemplar("record", "join", *files, "-o", self.folder / "joined.mcap")
+        first, second = joined["files"]
+        self.assertEqual(first["offset_s"], 0)
+        self.assertLess(abs(second["offset_s"] - 7.5), second["uncertainty_s"] + 0.01)
+        self.assertGreater(second["repeated"], 0)
+        infos = [exemplar("record", "info", file) for file in (*files, self.folder / "joined.mcap")]
+        of_topic = [sum(topic["messages"] for topic in info["topics"] if topic["topic"] == TOPIC) for info in infos]
+        self.assertGreaterEqual(of_topic[2], max(of_topic[:2]))
+        self.assertLessEqual(of_topic[2], self.samples)
+        self.assertEqual([loss["lost_in_gaps"] + loss["lost_at_end"] for loss in infos[2]["losses"] if loss["topic"] == TOPIC], [0])
+        # On one base the two recorders' files take hardly longer than each alone.
+        self.assertLess(infos[2]["duration_s"], max(info["duration_s"] for info in infos[:2]) + 2)
+
+    def test_programs_find_each_other_by_a_discovery_server_without_multicast(self):
+        if not os.path.exists(DISCOVERY_SERVER):
+            self.skipTest("fastdds-tools is not installed")
+        for machine in self.machines:
+            machine.run("iptables", "-A", "OUTPUT", "-d", "224.0.0.0/4", "-j", "DROP")
+        command = [*self.recorder_machine.prefix, DISCOVERY_SERVER, "-i", "0", "-l", "10.93.0.2", "-p", "11811"]
+        server = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL)
+        self.programs.running.append(server)
+        figures, recorded = self.record(lambda server: None, rate="4", words=("--discovery-server", "10.93.0.2:11811"))
+        self.check_whole(figures, recorded)
 
 
 class SlowNetworkTest(NetworkCase):
@@ -134,27 +253,26 @@ class SlowNetworkTest(NetworkCase):
 
     def test_nothing_is_lost_when_the_link_is_cut_for_10_s(self):
         def cut(server):
-            run("ip", "link", "set", self.capture_machine.name, "down")
+            self.cut()
             time.sleep(1)
             before = self.topic(server)["received"]
             time.sleep(9)
             self.assertEqual(self.topic(server)["received"], before)
-            run("ip", "link", "set", self.capture_machine.name, "up")
+            self.restore()
 
-        figures, recorded = self.record(cut, rate="0.3")  # so that the link is back before the trial ends
+        figures, recorded = self.record(cut, rate="0.3")
         self.check_whole(figures, recorded)
 
     def test_a_publisher_killed_and_started_again_is_counted_as_two(self):
         _, server = self.start_recorder()
-        words = ("exemplar-capture-suit", "--replay", self.trial, "--rate", "1")
-        first = self.programs.start(*words, prefix=self.capture_machine.prefix)
+        first = self.start_capture(self.trial, "1")
         self.at_recorder("record", "start", "--name", "t", "--topic", TOPIC, "--wait", "30", "--server", server)
         wait_for(lambda: self.topic(server)["received"] > 100, "samples")
         first.kill()
         first.wait()
         before = self.topic(server)["received"]
         self.assertLess(before, self.samples)
-        self.assertEqual(self.programs.start(*words, prefix=self.capture_machine.prefix).wait(60), 0)
+        self.assertEqual(self.start_capture(self.trial, "1").wait(60), 0)
         figures = self.topic(server)
         self.at_recorder("record", "stop", "--server", server)
         self.assertEqual(figures["lost"], 0, self.programs.logs())
@@ -163,6 +281,51 @@ class SlowNetworkTest(NetworkCase):
         of_writers = [topic["messages"] for topic in info["topics"] if topic["topic"] == TOPIC]
         self.assertEqual(len(of_writers), 2)
         self.assertEqual(of_writers[1], self.samples)
+
+    def test_what_a_killed_publisher_had_announced_is_counted(self):
+        _, server = self.start_recorder()
+        capture = self.start_capture(self.long_trial(3000), "1")
+        self.at_recorder("record", "start", "--name", "t", "--topic", TOPIC, "--wait", "30", "--server", server)
+        reader = self.cyclone_reader(3000, quiet_s=6)
+        # Samples hold the number 1.0, which heartbeats and announcements do not: only these pass.
+        one = "|000000000000f03f|"
+        self.recorder_machine.run("iptables", "-A", "INPUT", "-i", "eth0", "-p", "udp", "-m", "string", "--algo", "bm", "--hex-string", one, "-j", "DROP")
+        time.sleep(2.5)
+        capture.kill()
+        capture.wait()
+        time.sleep(1)
+        figures = self.topic(server)
+        stopped = self.at_recorder("record", "stop", "--server", server)
+        counts = self.counts_of(reader)
+        info = exemplar("record", "info", self.folder / "data" / "t.mcap")
+        losses = [loss for loss in info["losses"] if loss["topic"] == TOPIC]
+        self.assertEqual([loss["received"] for loss in losses], [figures["received"]])
+        self.assertLess(abs(counts["last"] - figures["received"]), 2, self.programs.logs())
+        self.assertEqual(counts["missing"], 0)
+        self.assertEqual(sum(loss["lost_in_gaps"] + loss["lost_at_end"] for loss in losses), figures["lost"])
+        self.assertGreater(figures["lost"], 50, stopped)
+
+    def test_a_recorder_killed_and_started_again_goes_on_where_it_finds_the_writer(self):
+        recorder, server = self.start_recorder()
+        capture = self.start_capture(self.trial, "0.7")
+        self.at_recorder("record", "start", "--name", "first", "--topic", TOPIC, "--wait", "30", "--server", server)
+        wait_for(lambda: self.topic(server)["received"] > 100, "samples")
+        recorder.kill()
+        recorder.wait()
+        _, server = self.start_recorder()
+        self.at_recorder("record", "start", "--name", "second", "--topic", TOPIC, "--wait", "30", "--server", server)
+        # The dead one's reader counts as there until its lease ends: the capture waits for it.
+        self.assertEqual(capture.wait(60), 0, self.programs.logs())
+        figures = self.topic(server)
+        self.at_recorder("record", "stop", "--server", server)
+        self.assertEqual(figures["lost"], 0, self.programs.logs())
+        whole = self.folder / "first.whole.mcap"
+        exemplar("record", "recover", self.folder / "data" / "first.mcap", "--output", whole)
+        infos = [exemplar("record", "info", file) for file in (whole, self.folder / "data" / "second.mcap")]
+        parts = [sum(topic["messages"] for topic in info["topics"] if topic["topic"] == TOPIC) for info in infos]
+        self.assertGreater(parts[0], 50)
+        self.assertEqual(parts[1], figures["received"])
+        self.assertLess(sum(parts), self.samples + 1)
 
 
 if __name__ == "__main__":
