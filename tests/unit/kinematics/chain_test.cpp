@@ -34,6 +34,35 @@ TEST(Chain, PutsTheTwoLinkRobotWhereTrigonometryDoes) {
   EXPECT_NEAR(jacobian(5, 0), 1, 1e-15);
 }
 
+TEST(Chain, ManyPosesAtATimeAreThoseOfEach) {
+  Rng rng(8);
+  const RobotModel mixed = testing::Parse(testing::MixedRobot());
+  const Chain chains[] = {testing::ChainOf(testing::Parse(testing::TwoLinkRobot())),
+                          testing::ChainOf(mixed, "", "tool"),
+                          testing::ChainOf(mixed, "left", "tool")};
+  for (const Chain& chain : chains) {
+    for (const int n : {1, 4, 7, 33}) {
+      Eigen::MatrixXd joints(n, chain.dof());
+      for (int i = 0; i < n; ++i) joints.row(i) = testing::RandomPosture(chain, rng).transpose();
+      // Many turns, and more than can be taken off.
+      if (n > 9) joints.row(9) *= 1000;
+      if (n > 6) joints.row(6) *= 1e6;
+      const demonstration::ToolKinematics::Path path = chain.ToolPath(joints);
+      ASSERT_EQ(path.positions.rows(), n);
+      ASSERT_EQ(path.rotations.rows(), n);
+      for (int i = 0; i < n; ++i) {
+        const geometry::Pose pose = chain.ToolPose(joints.row(i).transpose());
+        const double scale = std::max(1.0, joints.row(i).cwiseAbs().maxCoeff());
+        EXPECT_LT((path.positions.row(i).transpose() - pose.translation).norm(), 1e-15 * 8 * scale);
+        const Eigen::Quaterniond rotation(path.rotations(i, 3), path.rotations(i, 0),
+                                          path.rotations(i, 1), path.rotations(i, 2));
+        EXPECT_LT(geometry::AngleBetween(rotation, pose.rotation), 1e-15 * 8 * scale);
+        EXPECT_NEAR(rotation.norm(), 1, 1e-14);
+      }
+    }
+  }
+}
+
 /// Central differences of the tool pose.
 Jacobian NumericJacobian(const Chain& chain, const Eigen::VectorXd& q) {
   constexpr double kStep = 1e-6;

@@ -13,6 +13,24 @@ namespace {
 // motion's extent, where all trials had one place) is far.
 constexpr double kFarPart = 0.5;
 
+// Nothing that a robot reaches for is further (m), nor turned so often (rad): sums of squares stay
+// finite and small numbers beside them are kept.
+constexpr double kFarthest_m = 1e4;
+constexpr double kFurthestTurn_rad = 1e4;
+
+Status CheckPosition(const Eigen::Vector3d& position, const std::string& what,
+                     const std::string& field) {
+  if (!position.allFinite()) return InvalidArgument(what + " is not finite", field);
+  for (const double value : position) {
+    if (std::abs(value) > kFarthest_m) {
+      return InvalidArgument(what + " has coordinate " + FormatDouble(value) + " m, beyond " +
+                                 FormatDouble(kFarthest_m) + " m",
+                             field);
+    }
+  }
+  return {};
+}
+
 std::string Metres(double value) { return FormatFixed(value, 3) + " m"; }
 
 std::string Place(std::size_t index) { return "objects[" + std::to_string(index) + "]"; }
@@ -38,9 +56,11 @@ Status CheckQuery(const Exemplars& exemplars, const demonstration::SkillQuery& q
         return InvalidArgument("object \"" + object.name + "\" is given twice", Place(i) + ".name");
       }
     }
-    if (!object.base_T_object.translation.allFinite()) {
-      return InvalidArgument("object \"" + object.name + "\": its position is not finite",
-                             Place(i) + ".position");
+    if (Status good =
+            CheckPosition(object.base_T_object.translation,
+                          "object \"" + object.name + "\": its position", Place(i) + ".position");
+        !good.ok()) {
+      return good;
     }
     const double norm = object.base_T_object.rotation.norm();
     if (object.has_orientation && !(std::abs(norm - 1) < 1e-3)) {
@@ -50,8 +70,9 @@ Status CheckQuery(const Exemplars& exemplars, const demonstration::SkillQuery& q
     }
   }
   if (query.start.has_value()) {
-    if (!query.start->translation.allFinite()) {
-      return InvalidArgument("the start position is not finite", "start");
+    if (Status good = CheckPosition(query.start->translation, "the start position", "start");
+        !good.ok()) {
+      return good;
     }
     if (query.start_has_orientation && !(std::abs(query.start->rotation.norm() - 1) < 1e-3)) {
       return InvalidArgument("the start's quaternion has length " +
@@ -82,8 +103,11 @@ Eigen::MatrixXd ObjectPositions(const Exemplars& exemplars, std::size_t object) 
 void WarnWhenFar(const Exemplars& exemplars, std::size_t object, const Eigen::Vector3d& position,
                  std::vector<std::string>& warnings) {
   const Eigen::MatrixXd positions = ObjectPositions(exemplars, object);
-  const double distance = DistanceFromHull(positions, position);
   double extent = (positions.colwise().maxCoeff() - positions.colwise().minCoeff()).norm();
+  // The hull is no further than the nearest trial.
+  const double nearest = (positions.rowwise() - position.transpose()).rowwise().norm().minCoeff();
+  if (nearest <= kFarPart * extent) return;
+  const double distance = DistanceFromHull(positions, position);
   if (distance <= kFarPart * extent) return;
   const bool one_place = extent < 0.05 * MotionExtent(exemplars);
   if (one_place) extent = 0.5 * MotionExtent(exemplars);
@@ -103,6 +127,13 @@ Result<std::optional<Eigen::VectorXd>> JointStart(const Exemplars& exemplars,
   }
   const Eigen::VectorXd& given = *query.joint_start;
   if (!given.allFinite()) return InvalidArgument("joint_start is not finite", "joint_start");
+  for (const double value : given) {
+    if (std::abs(value) > kFurthestTurn_rad) {
+      return InvalidArgument("joint_start holds " + FormatDouble(value) + ", beyond " +
+                                 FormatDouble(kFurthestTurn_rad),
+                             "joint_start");
+    }
+  }
   if (query.joint_start_names.empty()) {
     if (given.size() != exemplars.joints()) {
       return InvalidArgument("joint_start has " + std::to_string(given.size()) +
@@ -180,6 +211,9 @@ Result<demonstration::SkillMotion> Answer(const Skill& skill,
     situation.start_has_orientation = query.start_has_orientation;
   }
   situation.joint_start = std::move(*joint_start);
+  if (query.joint_start.has_value() && exemplars.joints() == 0) {
+    motion.warnings.push_back("joint_start is not used: the skill has no joints");
+  }
   if (situation.joint_start.has_value() && !situation.base_T_start.has_value() &&
       data.tool != nullptr && exemplars.has_tool) {
     situation.base_T_start = data.tool->ToolPose(*situation.joint_start);
@@ -195,7 +229,7 @@ Result<demonstration::SkillMotion> Answer(const Skill& skill,
   motion.object_names = exemplars.object_names;
   motion.objectivity = std::move(prediction.objectivity);
   motion.sigma_m.assign(prediction.sigma_m.begin(), prediction.sigma_m.end());
-  motion.markers_s = data.alignment->knots_s;
+  motion.markers_s = data.alignment->markers_s;
   motion.warnings.insert(motion.warnings.end(), prediction.warnings.begin(),
                          prediction.warnings.end());
   for (std::size_t k = 0; k < exemplars.contacts.size(); ++k) {

@@ -5,8 +5,6 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "weighted_sum.hpp"
-
 namespace exemplar::learning {
 
 /// n trials with 3-vectors at N frames; the covariance between two trials is a 3 x 3 block, the
@@ -17,15 +15,12 @@ class BlockKriging {
   /// `values`: 3n x N.
   BlockKriging(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& values);
 
-  /// 3 x 3n: the prediction is weights * values. `cross`: 3 x 3n covariance of the wanted trial
-  /// with the others.
-  Eigen::Matrix3Xd Weights(const Eigen::Ref<const Eigen::Matrix3Xd>& cross) const {
-    return WeightedBlocks(cross, inverse_);
-  }
   /// Value minus what the other trials predict: 3n x N. Rippa 1999, in blocks.
   const Eigen::MatrixXd& left_out_errors() const { return errors_; }
   /// Variance of the noise at each frame (N), from the left-out errors and what they should be.
   const Eigen::VectorXd& noise_variance() const { return noise_; }
+  /// 3n x 3n: the prediction is cross * inverse * values, where `cross` is the 3 x 3n covariance of
+  /// the wanted trial with the others.
   const Eigen::MatrixXd& inverse() const { return inverse_; }
   /// inverse * values: 3n x N.
   Eigen::MatrixXd Duals(const Eigen::MatrixXd& values) const { return inverse_ * values; }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "exemplar/learning/objectivity.hpp"
+#include "rotations.hpp"
 
 namespace exemplar::learning {
 namespace {
@@ -62,13 +63,16 @@ FramesModel::FramesModel(const Exemplars& exemplars)
       contacts_(exemplars.contacts) {
   const int n = exemplars.size();
   style_ = ChooseStyle(exemplars);
-  joints_.resize(frames_ * joints_count_, n);
-  if (exemplars.trials[0].hand.size() > 0) hand_ = Bundle(frames_, 1, n);
+  const bool has_hand = exemplars.trials[0].hand.size() > 0;
+  Eigen::MatrixXd joints(frames_ * joints_count_, n);
+  Eigen::MatrixXd hand(has_hand ? frames_ : 0, n);
   for (int j = 0; j < n; ++j) {
     const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
-    joints_.col(j) = trial.joints.reshaped();
-    if (!hand_.empty()) hand_.Set(j, trial.hand);
+    joints.col(j) = trial.joints.reshaped();
+    if (has_hand) hand.col(j) = trial.hand;
   }
+  joints_ = Streams(joints);
+  hand_ = Streams(hand);
   objectivity_ = Eigen::MatrixXd::Zero(frames_, exemplars.objects());
   if (!exemplars.has_tool) return;
 
@@ -133,23 +137,18 @@ void FramesModel::MeetContacts(const Situation& situation, Prediction& predictio
 Prediction FramesModel::Predict(const Situation& situation) const {
   Prediction prediction;
   const Eigen::VectorXd weights = StyleWeights(situation);
-  prediction.joints = WeightedSum(joints_, weights).reshaped(frames_, joints_count_);
-  if (!hand_.empty()) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
+  prediction.joints = joints_.Sum(weights).reshaped(frames_, joints_count_);
+  if (hand_.rows() > 0) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
   prediction.objectivity = objectivity_;
   Eigen::VectorXd start_share = Eigen::VectorXd::Zero(frames_);
   if (path_.has_value()) {
     start_share = path_->start_share();
     const FrameSituation where = path_->From(situation);
     PathFrames::Answer answer = path_->Predict(where);
-    const std::vector<Eigen::Quaterniond> rotations = rotation_->Predict(situation, where);
     // What the noise of the trials leaves between the answer's first frame and the start.
-    const Eigen::Vector3d missing = where.start - answer.positions.col(0);
-    prediction.tool.resize(static_cast<std::size_t>(frames_));
-    for (int i = 0; i < frames_; ++i) {
-      prediction.tool[static_cast<std::size_t>(i)] = {
-          answer.positions.col(i) + start_share[i] * missing,
-          rotations[static_cast<std::size_t>(i)]};
-    }
+    const Eigen::RowVector3d missing = where.start.transpose() - answer.positions.row(0);
+    answer.positions += start_share * missing;
+    prediction.tool = ToPoses(answer.positions, rotation_->Predict(situation, where));
     prediction.sigma_m = std::move(answer.sigma_m);
     MeetContacts(situation, prediction);
     if (situation.base_T_start.has_value()) {

@@ -1,6 +1,7 @@
 #include "json_values.hpp"
 
 #include <array>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -8,10 +9,21 @@ namespace exemplar::learning {
 
 using nlohmann::json;
 
+std::vector<double> ToNumbers(const json& j) {
+  if (!j.is_binary()) return j.get<std::vector<double>>();
+  const json::binary_t& bytes = j.get_binary();
+  if (bytes.size() % sizeof(double) != 0) {
+    throw json::other_error::create(501, "bytes of numbers are no multiple of eight", &j);
+  }
+  std::vector<double> numbers(bytes.size() / sizeof(double));
+  std::memcpy(numbers.data(), bytes.data(), bytes.size());
+  return numbers;
+}
+
 json FromVector(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
 Eigen::VectorXd ToVector(const json& j) {
-  const auto values = j.get<std::vector<double>>();
+  const std::vector<double> values = ToNumbers(j);
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
@@ -24,7 +36,7 @@ json FromMatrix(const Eigen::MatrixXd& m) {
 Eigen::MatrixXd ToMatrix(const json& j) {
   const auto rows = j.at("rows").get<Eigen::Index>();
   const auto cols = j.at("cols").get<Eigen::Index>();
-  const auto values = j.at("values").get<std::vector<double>>();
+  const std::vector<double> values = ToNumbers(j.at("values"));
   if (rows < 0 || cols < 0 || static_cast<std::size_t>(rows * cols) != values.size()) {
     throw json::other_error::create(501, "matrix size does not fit its values", &j);
   }
@@ -51,7 +63,7 @@ json FromPoses(const std::vector<geometry::Pose>& poses) {
 }
 
 std::vector<geometry::Pose> ToPoses(const json& j) {
-  const auto v = j.get<std::vector<double>>();
+  const std::vector<double> v = ToNumbers(j);
   if (v.size() % 7 != 0) throw json::other_error::create(501, "poses need 7 values each", &j);
   std::vector<geometry::Pose> poses;
   for (std::size_t i = 0; i < v.size(); i += 7) {

@@ -10,6 +10,9 @@
 
 namespace exemplar::learning {
 
+/// From an array, or from the bytes of doubles that skill_bytes.cpp makes of one.
+std::vector<double> ToNumbers(const nlohmann::json& j);
+
 nlohmann::json FromVector(const Eigen::VectorXd& v);
 Eigen::VectorXd ToVector(const nlohmann::json& j);
 

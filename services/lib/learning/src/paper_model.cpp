@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "exemplar/base/text.hpp"
+#include "rotations.hpp"
+
 namespace exemplar::learning {
 namespace {
 
@@ -17,9 +20,19 @@ Eigen::MatrixXd TargetPositions(const Exemplars& exemplars) {
   return positions;
 }
 
-Eigen::MatrixXd AsRows(const Eigen::VectorXd& stacked, int channels) {
-  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-      stacked.data(), stacked.size() / std::max(channels, 1), channels);
+// The paper's motion depends on the object alone. A start further from its first frame than this is
+// told.
+constexpr double kNearStart_m = 5e-3;
+constexpr double kNearStart_rad = 0.02;
+
+void WarnOfStart(double away, double near, const char* unit, std::vector<std::string>& warnings) {
+  if (away <= near) return;
+  warnings.push_back("method=paper does not use the start: the motion begins " +
+                     FormatFixed(away, 3) + " " + unit + " from it");
+}
+
+Eigen::MatrixX3d AsPath(const Eigen::VectorXd& stacked) {
+  return Eigen::Map<const Eigen::MatrixX3d>(stacked.data(), stacked.size() / 3, 3);
 }
 
 }  // namespace
@@ -34,27 +47,30 @@ PaperModel::PaperModel(const Exemplars& exemplars,
       tool_(std::move(tool)) {
   const int n = exemplars.size();
   rbf_.emplace(TargetPositions(exemplars), RbfOptions{.trend = Trend::kAffine, .ridge = 0});
-  joints_ = Bundle(frames_, joints_count_, n);
+  const bool has_hand = exemplars.trials[0].hand.size() > 0;
+  Eigen::MatrixXd joints(frames_ * joints_count_, n);
+  Eigen::MatrixXd hand(has_hand ? frames_ : 0, n);
   for (int j = 0; j < n; ++j) {
-    joints_.Set(j, exemplars.trials[static_cast<std::size_t>(j)].joints);
+    const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
+    joints.col(j) = trial.joints.reshaped();
+    if (has_hand) hand.col(j) = trial.hand;
   }
-  if (exemplars.trials[0].hand.size() > 0) {
-    hand_ = Bundle(frames_, 1, n);
-    for (int j = 0; j < n; ++j) hand_.Set(j, exemplars.trials[static_cast<std::size_t>(j)].hand);
-  }
+  joints_ = Streams(joints);
+  hand_ = Streams(hand);
   objectivity_ = Eigen::MatrixXd::Zero(frames_, objects_);
   if (!exemplars.has_tool) return;
 
   std::vector<Eigen::MatrixXd> base;
   std::vector<std::vector<Eigen::Quaterniond>> rotations(static_cast<std::size_t>(n));
-  base_path_ = Bundle(frames_, 3, n);
+  Eigen::MatrixXd paths(3 * frames_, n);
   for (int j = 0; j < n; ++j) {
     base.push_back(exemplars.BasePath(j));
-    base_path_.Set(j, base.back());
+    paths.col(j) = base.back().reshaped();
     for (const geometry::Pose& pose : exemplars.trials[static_cast<std::size_t>(j)].tool) {
       rotations[static_cast<std::size_t>(j)].push_back(pose.rotation);
     }
   }
+  base_path_ = Streams(paths);
   rotation_ = RotationBundle(rotations);
   upsilon_ = Eigen::VectorXd::Zero(frames_);
   for (int o = 0; o < objects_; ++o) {
@@ -64,19 +80,16 @@ PaperModel::PaperModel(const Exemplars& exemplars,
     objectivity_.col(o) = objectivity.upsilon;
     if (o != target_) continue;
     upsilon_ = objectivity.upsilon;
-    object_path_ = Bundle(frames_, 3, n);
-    for (int j = 0; j < n; ++j) object_path_.Set(j, shifted[static_cast<std::size_t>(j)]);
+    for (int j = 0; j < n; ++j) paths.col(j) = shifted[static_cast<std::size_t>(j)].reshaped();
+    object_path_ = Streams(paths);
   }
 
   blends_ = through_joints_ || rbf_->rank() < 3;
 
   // Standard error from the closed-form leave-one-out residuals of the path.
-  const Bundle& path = object_path_.empty() ? base_path_ : object_path_;
-  const Eigen::MatrixXd residuals = rbf_->LeaveOneOut(path.stacked().transpose());
-  left_out_variance_ = Eigen::VectorXd::Zero(frames_);
-  for (int i = 0; i < frames_; ++i) {
-    left_out_variance_[i] = residuals.middleCols(3 * i, 3).squaredNorm() / n;
-  }
+  const Eigen::MatrixXd residuals = rbf_->LeaveOneOut(paths.transpose());
+  const Eigen::VectorXd squared = residuals.colwise().squaredNorm().transpose() / n;
+  left_out_variance_ = AsPath(squared).rowwise().sum();
 }
 
 Eigen::VectorXd PaperModel::Weights(const Situation& situation) const {
@@ -84,59 +97,56 @@ Eigen::VectorXd PaperModel::Weights(const Situation& situation) const {
   return rbf_->Weights(situation.base_T_object[static_cast<std::size_t>(target_)].translation);
 }
 
-std::vector<geometry::Pose> PaperModel::Absolute(const Eigen::VectorXd& weights,
-                                                 const Eigen::MatrixXd& joints) const {
-  std::vector<geometry::Pose> path(static_cast<std::size_t>(frames_));
-  if (through_joints_) {
-    for (int i = 0; i < frames_; ++i) {
-      path[static_cast<std::size_t>(i)] = tool_->ToolPose(joints.row(i).transpose());
-    }
-    return path;
-  }
-  const Eigen::VectorXd positions = base_path_.Sum(weights);
-  const Eigen::VectorXd turns = rotation_.Sum(weights);
-  for (int i = 0; i < frames_; ++i) {
-    path[static_cast<std::size_t>(i)] = {positions.segment<3>(3 * i), rotation_.At(i, turns)};
-  }
-  return path;
+demonstration::ToolKinematics::Path PaperModel::Absolute(const Eigen::VectorXd& weights,
+                                                         const Eigen::MatrixXd& joints) const {
+  if (through_joints_) return tool_->ToolPath(joints);
+  return {AsPath(base_path_.Sum(weights)), rotation_.Sum(weights)};
 }
 
 std::vector<geometry::Pose> PaperModel::AbsolutePath(const Situation& situation) const {
-  if (base_path_.empty()) return {};
+  if (base_path_.rows() == 0) return {};
   const Eigen::VectorXd weights = Weights(situation);
-  return Absolute(weights, AsRows(joints_.Sum(weights), joints_count_));
+  const auto path = Absolute(weights, joints_.Sum(weights).reshaped(frames_, joints_count_));
+  return ToPoses(path.positions, path.rotations);
 }
 
 Prediction PaperModel::Predict(const Situation& situation) const {
   const Eigen::VectorXd weights = Weights(situation);
   Prediction prediction;
-  prediction.joints =
-      joints_count_ > 0 ? AsRows(joints_.Sum(weights), joints_count_) : Eigen::MatrixXd(frames_, 0);
-  if (!hand_.empty()) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
+  prediction.joints = joints_.Sum(weights).reshaped(frames_, joints_count_);
+  if (hand_.rows() > 0) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
   prediction.objectivity = objectivity_;
-  if (base_path_.empty()) return prediction;
+  if (base_path_.rows() == 0) {
+    if (situation.joint_start.has_value()) {
+      const double away_rad =
+          (*situation.joint_start - prediction.joints.row(0).transpose()).cwiseAbs().maxCoeff();
+      WarnOfStart(away_rad, kNearStart_rad, "rad", prediction.warnings);
+    }
+    return prediction;
+  }
 
-  prediction.tool = Absolute(weights, prediction.joints);
+  auto path = Absolute(weights, prediction.joints);
+  if (situation.base_T_start.has_value()) {
+    const double away_m =
+        (situation.base_T_start->translation - path.positions.row(0).transpose()).norm();
+    WarnOfStart(away_m, kNearStart_m, "m", prediction.warnings);
+  }
   double variance_part = 1;
   if (target_ >= 0) {
     const Eigen::Vector3d base_p_object =
         situation.base_T_object[static_cast<std::size_t>(target_)].translation;
     // Where the positions span space the two solutions of trials without joints are one.
     if (blends_) {
-      const Eigen::VectorXd relative = object_path_.Sum(weights);
-      const Eigen::VectorXd turns = rotation_.Sum(weights);
-      for (int i = 0; i < frames_; ++i) {
-        geometry::Pose& pose = prediction.tool[static_cast<std::size_t>(i)];
-        const geometry::Pose objective{base_p_object + relative.segment<3>(3 * i),
-                                       rotation_.At(i, turns)};
-        pose.translation += upsilon_[i] * (objective.translation - pose.translation);
-        pose.rotation = pose.rotation.slerp(upsilon_[i], objective.rotation);
-      }
+      Eigen::MatrixX3d objective = AsPath(object_path_.Sum(weights));
+      objective.rowwise() += base_p_object.transpose();
+      path.positions += upsilon_.asDiagonal() * (objective - path.positions);
+      path.rotations = Between(path.rotations, rotation_.Sum(weights), upsilon_);
     }
     if (rbf_->MeanLeaveOneOutVariance() > 0) {
       variance_part = rbf_->Variance(base_p_object) / rbf_->MeanLeaveOneOutVariance();
     }
   }
+  prediction.tool = ToPoses(path.positions, path.rotations);
   prediction.sigma_m = (left_out_variance_ * variance_part).cwiseSqrt();
   return prediction;
 }

@@ -28,8 +28,8 @@ class PaperModel final : public Model {
 
  private:
   Eigen::VectorXd Weights(const Situation& situation) const;
-  std::vector<geometry::Pose> Absolute(const Eigen::VectorXd& weights,
-                                       const Eigen::MatrixXd& joints) const;
+  demonstration::ToolKinematics::Path Absolute(const Eigen::VectorXd& weights,
+                                               const Eigen::MatrixXd& joints) const;
 
   int frames_ = 0;
   int joints_count_ = 0;
@@ -39,7 +39,8 @@ class PaperModel final : public Model {
   bool blends_ = false;
   std::shared_ptr<const demonstration::ToolKinematics> tool_;
   std::optional<CardinalRbf> rbf_;
-  Bundle joints_, base_path_, object_path_, hand_;
+  // Of each trial a column: joint by joint, x y z of all frames, hand.
+  Streams joints_, base_path_, object_path_, hand_;
   RotationBundle rotation_;
   Eigen::VectorXd upsilon_;            // of the target
   Eigen::MatrixXd objectivity_;        // frames x objects

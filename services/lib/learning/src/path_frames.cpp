@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "exemplar/base/text.hpp"
-#include "weighted_sum.hpp"
 
 namespace exemplar::learning {
 namespace {
@@ -83,26 +82,33 @@ FrameSituation PathFrames::From(const Situation& situation) const {
   return result;
 }
 
-Eigen::MatrixXd PathFrames::Covariance(const FrameSituation& a, const FrameSituation& b,
-                                       const FrameGains& gains) const {
+PathFrames::Likeness PathFrames::Compare(const FrameSituation& a, const FrameSituation& b) const {
   const Eigen::Vector3d from_a = (a.start - a.object) / length_m_;
   const Eigen::Vector3d from_b = (b.start - b.object) / length_m_;
-  const Eigen::Matrix3d turn = a.turn * b.turn.transpose();
-  Eigen::Matrix3d block = kStartGain * from_a * from_b.transpose() + kObjectGain * turn;
-  if (gains.start_axes > 0) {
-    const Eigen::Vector3d along =
-        (a.turn.transpose() * from_a).cwiseProduct(b.turn.transpose() * from_b);
-    block += gains.start_axes * a.turn * along.asDiagonal() * b.turn.transpose();
-  }
+  Likeness likeness;
+  likeness.turn.noalias() = a.turn * b.turn.transpose();
+  likeness.always.noalias() = kStartGain * from_a * from_b.transpose();
+  likeness.always += kObjectGain * likeness.turn;
+  const Eigen::Vector3d along =
+      (a.turn.transpose() * from_a).cwiseProduct(b.turn.transpose() * from_b);
+  const Eigen::Matrix3d scaled = a.turn * along.asDiagonal();
+  likeness.along_axes.noalias() = scaled * b.turn.transpose();
+  const double squared = (from_a - from_b).squaredNorm();
+  const double turned = 0.25 * (a.turn.leftCols<2>() - b.turn.leftCols<2>()).squaredNorm();
+  likeness.by_place = std::exp(-std::sqrt(squared));
+  likeness.by_place_and_turn = std::exp(-std::sqrt(squared + turned));
+  return likeness;
+}
+
+Eigen::Matrix3d PathFrames::Covariance(const Likeness& likeness, const FrameGains& gains) {
+  Eigen::Matrix3d block = likeness.always;
+  if (gains.start_axes > 0) block += gains.start_axes * likeness.along_axes;
   if (gains.world > 0) block.diagonal().array() += gains.world;
   if (gains.residual > 0) {
-    double squared = (from_a - from_b).squaredNorm();
-    if (gains.by_orientation) {
-      squared += 0.25 * (a.turn.leftCols<2>() - b.turn.leftCols<2>()).squaredNorm();
-    }
-    const double similarity = gains.residual * std::exp(-std::sqrt(squared));
+    const double similarity =
+        gains.residual * (gains.by_orientation ? likeness.by_place_and_turn : likeness.by_place);
     if (gains.residual_turns) {
-      block += similarity * turn;
+      block += similarity * likeness.turn;
     } else {
       block.diagonal().array() += similarity;
     }
@@ -118,8 +124,9 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
     for (Eigen::Index i = 0; i < m; ++i) {
       for (Eigen::Index j = i; j < m; ++j) {
         const Eigen::Matrix3d block = Covariance(
-            situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])],
-            situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(j)])], gains);
+            Compare(situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])],
+                    situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(j)])]),
+            gains);
         matrix.block<3, 3>(3 * i, 3 * j) = block;
         matrix.block<3, 3>(3 * j, 3 * i) = block.transpose();
       }
@@ -168,8 +175,16 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
     total += share;
     members_.push_back({.gains = *candidate.gains,
                         .share = share,
-                        .kriging = BlockKriging(covariance(all, *candidate.gains), values_)});
+                        .kriging = BlockKriging(covariance(all, *candidate.gains), values_),
+                        .inverse = {}});
+    members_.back().inverse = Streams(members_.back().kriging.inverse());
   }
+  paths_ = Streams(values_.transpose());
+  Eigen::MatrixXd noise(values_.cols(), static_cast<Eigen::Index>(members_.size()));
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    noise.col(static_cast<Eigen::Index>(k)) = members_[k].kriging.noise_variance();
+  }
+  noise_ = Streams(noise);
   start_share_ = Eigen::VectorXd::Zero(values_.cols());
   for (Member& member : members_) {
     member.share /= total;
@@ -191,24 +206,29 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
 
 PathFrames::Answer PathFrames::Predict(const FrameSituation& situation) const {
   const auto n = static_cast<Eigen::Index>(situations_.size());
-  Eigen::Matrix3Xd weights = Eigen::Matrix3Xd::Zero(3, 3 * n);
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(values_.cols());
-  Eigen::Matrix3Xd cross(3, 3 * n);
-  for (const Member& member : members_) {
+  std::vector<Likeness> likeness;
+  likeness.reserve(situations_.size());
+  for (const FrameSituation& trial : situations_) likeness.push_back(Compare(situation, trial));
+  const Likeness self = Compare(situation, situation);
+
+  Eigen::MatrixX3d weights = Eigen::MatrixX3d::Zero(3 * n, 3);
+  Eigen::VectorXd noise(static_cast<Eigen::Index>(members_.size()));
+  Eigen::MatrixX3d cross(3 * n, 3);
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    const Member& member = members_[k];
     for (Eigen::Index j = 0; j < n; ++j) {
-      cross.middleCols<3>(3 * j) =
-          Covariance(situation, situations_[static_cast<std::size_t>(j)], member.gains);
+      cross.middleRows<3>(3 * j) =
+          Covariance(likeness[static_cast<std::size_t>(j)], member.gains).transpose();
     }
-    const Eigen::Matrix3Xd own = member.kriging.Weights(cross);
+    const Eigen::MatrixX3d own = member.inverse.Sum3(cross);
     weights += member.share * own;
-    const double known =
-        Covariance(situation, situation, member.gains).trace() - own.cwiseProduct(cross).sum();
-    variance += member.share * (3 + std::max(0.0, known)) * member.kriging.noise_variance();
+    const double known = Covariance(self, member.gains).trace() - own.cwiseProduct(cross).sum();
+    noise[static_cast<Eigen::Index>(k)] = member.share * (3 + std::max(0.0, known));
   }
   Answer answer;
-  answer.positions = WeightedBlocks(weights, values_);
-  answer.positions.colwise() += situation.object;
-  answer.sigma_m = variance.cwiseSqrt();
+  answer.positions = paths_.Sum3(weights);
+  answer.positions.rowwise() += situation.object.transpose();
+  answer.sigma_m = noise_.Sum(noise).cwiseSqrt();
   return answer;
 }
 

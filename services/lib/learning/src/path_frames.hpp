@@ -15,6 +15,7 @@
 
 #include "block_kriging.hpp"
 #include "exemplars.hpp"
+#include "weighted_sum.hpp"
 
 namespace exemplar::learning {
 
@@ -40,7 +41,7 @@ class PathFrames {
   explicit PathFrames(const Exemplars& exemplars);
 
   struct Answer {
-    Eigen::Matrix3Xd positions;  ///< 3 x frames, base frame
+    Eigen::MatrixX3d positions;  ///< one a frame, base frame
     Eigen::VectorXd sigma_m;     ///< frames
   };
   Answer Predict(const FrameSituation& situation) const;
@@ -59,8 +60,16 @@ class PathFrames {
   FrameSituation From(const Situation& situation) const;
 
  private:
-  Eigen::MatrixXd Covariance(const FrameSituation& a, const FrameSituation& b,
-                             const FrameGains& gains) const;
+  /// What two situations have in common, before the gains.
+  struct Likeness {
+    Eigen::Matrix3d always;      ///< start and object
+    Eigen::Matrix3d along_axes;  ///< A
+    Eigen::Matrix3d turn;        ///< from b's object to a's
+    double by_place = 0;         ///< 1 where start and object agree, falling with their distance
+    double by_place_and_turn = 0;
+  };
+  Likeness Compare(const FrameSituation& a, const FrameSituation& b) const;
+  static Eigen::Matrix3d Covariance(const Likeness& likeness, const FrameGains& gains);
   void Fit(const std::vector<FrameGains>& grid);
 
   int target_ = -1;
@@ -73,8 +82,11 @@ class PathFrames {
     FrameGains gains;
     double share = 0;
     BlockKriging kriging;
+    Streams inverse;  // kriging's, for queries
   };
   std::vector<Member> members_;
+  Streams paths_;  // values_, a row of it a column
+  Streams noise_;  // variance of each member's noise at each frame (m^2)
   Eigen::VectorXd start_share_;
 };
 

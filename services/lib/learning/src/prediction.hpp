@@ -28,27 +28,6 @@ class Model {
   virtual Prediction Predict(const Situation& situation) const = 0;
 };
 
-/// Trials' streams stacked so that a query is one weighted sum: column j is trial j.
-class Bundle {
- public:
-  Bundle() = default;
-  Bundle(int frames, int channels, int trials)
-      : channels_(channels), stacked_(Eigen::MatrixXd::Zero(frames * channels, trials)) {}
-  /// Rows are frames, columns channels.
-  void Set(int trial, const Eigen::Ref<const Eigen::MatrixXd>& stream);
-  /// Frame-major: channel k of frame i at i * channels + k.
-  Eigen::VectorXd Sum(const Eigen::Ref<const Eigen::VectorXd>& weights) const {
-    return WeightedSum(stacked_, weights);
-  }
-  const Eigen::MatrixXd& stacked() const { return stacked_; }
-  int channels() const { return channels_; }
-  bool empty() const { return stacked_.size() == 0; }
-
- private:
-  int channels_ = 0;
-  Eigen::MatrixXd stacked_;
-};
-
 /// Rotations of the trials about their mean at each frame, so that a weighted rotation is a
 /// weighted sum of rotation vectors.
 class RotationBundle {
@@ -56,18 +35,12 @@ class RotationBundle {
   RotationBundle() = default;
   /// `rotations[trial][frame]`.
   explicit RotationBundle(const std::vector<std::vector<Eigen::Quaterniond>>& rotations);
-  /// Frame i of the weighted rotation is mean(i) * Exp(sum's segment 3 i).
-  Eigen::VectorXd Sum(const Eigen::Ref<const Eigen::VectorXd>& weights) const {
-    return vectors_.Sum(weights);
-  }
-  Eigen::Quaterniond At(int frame, const Eigen::Ref<const Eigen::VectorXd>& sum) const {
-    return mean_[static_cast<std::size_t>(frame)] * geometry::ExpSo3(sum.segment<3>(3 * frame));
-  }
-  bool empty() const { return mean_.empty(); }
+  /// One a frame, x y z w.
+  Eigen::MatrixX4d Sum(const Eigen::Ref<const Eigen::VectorXd>& weights) const;
 
  private:
-  std::vector<Eigen::Quaterniond> mean_;
-  Bundle vectors_;
+  Eigen::MatrixX4d mean_;
+  Streams vectors_;  // x y z of all frames a column, a column a trial
 };
 
 }  // namespace exemplar::learning

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "weighted_sum.hpp"
+#include "rotations.hpp"
 
 namespace exemplar::learning {
 namespace {
@@ -26,19 +26,14 @@ struct RotationFrames::Fitted {
   std::optional<BlockKriging> kriging;
 };
 
-Eigen::Matrix3d RotationFrames::Covariance(const Eigen::Vector3d& start_a, const FrameSituation& a,
-                                           const Eigen::Vector3d& start_b, const FrameSituation& b,
-                                           double residual) const {
-  Eigen::Matrix3d block = kStartGain * start_a * start_b.transpose();
-  block.diagonal().array() += kConstantGain;
-  if (residual > 0) {
-    const Eigen::Vector3d from_a = (a.start - a.object) / length_m_;
-    const Eigen::Vector3d from_b = (b.start - b.object) / length_m_;
-    const double squared = (from_a - from_b).squaredNorm() +
-                           0.25 * (a.turn.leftCols<2>() - b.turn.leftCols<2>()).squaredNorm();
-    block.diagonal().array() += residual * std::exp(-std::sqrt(squared));
-  }
-  return block;
+double RotationFrames::Diagonal(const FrameSituation& a, const FrameSituation& b,
+                                double residual) const {
+  if (residual == 0) return kConstantGain;
+  const Eigen::Vector3d from_a = (a.start - a.object) / length_m_;
+  const Eigen::Vector3d from_b = (b.start - b.object) / length_m_;
+  const double squared = (from_a - from_b).squaredNorm() +
+                         0.25 * (a.turn.leftCols<2>() - b.turn.leftCols<2>()).squaredNorm();
+  return kConstantGain + residual * std::exp(-std::sqrt(squared));
 }
 
 RotationFrames::RotationFrames(const Exemplars& exemplars, const PathFrames& path)
@@ -85,9 +80,10 @@ RotationFrames::RotationFrames(const Exemplars& exemplars, const PathFrames& pat
         for (std::size_t b = 0; b < n; ++b) {
           const auto row = 3 * static_cast<Eigen::Index>(a);
           const auto column = 3 * static_cast<Eigen::Index>(b);
-          covariance.block<3, 3>(row, column) =
-              Covariance(fitted.values.block<3, 1>(row, 0), situations_[a],
-                         fitted.values.block<3, 1>(column, 0), situations_[b], residual);
+          Eigen::Matrix3d block = kStartGain * fitted.values.block<3, 1>(row, 0) *
+                                  fitted.values.block<3, 1>(column, 0).transpose();
+          block.diagonal().array() += Diagonal(situations_[a], situations_[b], residual);
+          covariance.block<3, 3>(row, column) = block;
         }
       }
       fitted.kriging.emplace(covariance, fitted.values);
@@ -100,12 +96,17 @@ RotationFrames::RotationFrames(const Exemplars& exemplars, const PathFrames& pat
   }
   with_object_ = best->with_object;
   residual_ = best->residual;
-  mean_ = std::move(best->mean);
-  first_ = best->values.col(0);
-  duals_ = best->kriging->Duals(best->values);
+  mean_ = FromQuaternions(best->mean);
+  const Eigen::MatrixXd duals = best->kriging->Duals(best->values);
+  Eigen::MatrixXd columns(3 * duals.cols(), static_cast<Eigen::Index>(n));
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+    columns.col(j) = duals.middleRows<3>(3 * j).transpose().reshaped();
+  }
+  duals_ = residual_ == 0 ? Streams(columns.rowwise().sum()) : Streams(columns);
 
   // How much of a start's deviation is left at each frame: the start's posterior coefficient.
-  start_share_ = kStartGain * (first_.transpose() * duals_).transpose();
+  of_start_ = kStartGain * (best->values.col(0).transpose() * duals).transpose();
+  start_share_ = of_start_;
   const double first = start_share_[0];
   if (first > 1e-3) {
     start_share_ /= first;
@@ -115,34 +116,30 @@ RotationFrames::RotationFrames(const Exemplars& exemplars, const PathFrames& pat
   start_share_ = start_share_.cwiseMax(0.0).cwiseMin(1.0);
 }
 
-std::vector<Eigen::Quaterniond> RotationFrames::Predict(const Situation& situation,
-                                                        const FrameSituation& where) const {
+Eigen::MatrixX4d RotationFrames::Predict(const Situation& situation,
+                                         const FrameSituation& where) const {
   const Eigen::Quaterniond base_R_frame =
       with_object_ ? situation.base_T_object[static_cast<std::size_t>(target_)].rotation
                    : Eigen::Quaterniond::Identity();
-  const bool start_known = situation.base_T_start.has_value() && situation.start_has_orientation;
-  Eigen::Vector3d start = Eigen::Vector3d::Zero();
-  if (start_known) {
-    start = geometry::LogSo3((base_R_frame * mean_.front()).conjugate() *
-                             situation.base_T_start->rotation);
+  Eigen::VectorXd weights(duals_.count());
+  if (residual_ == 0) {
+    weights.setConstant(kConstantGain);
+  } else {
+    for (Eigen::Index j = 0; j < weights.size(); ++j) {
+      weights[j] = Diagonal(where, situations_[static_cast<std::size_t>(j)], residual_);
+    }
   }
-  const auto n = static_cast<Eigen::Index>(situations_.size());
-  Eigen::Matrix3Xd cross(3, 3 * n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    cross.middleCols<3>(3 * j) = Covariance(start, where, first_.segment<3>(3 * j),
-                                            situations_[static_cast<std::size_t>(j)], residual_);
+  Eigen::VectorXd sum = duals_.Sum(weights);
+  Eigen::Map<Eigen::MatrixX3d> vectors(sum.data(), mean_.rows(), 3);
+  if (situation.base_T_start.has_value() && situation.start_has_orientation) {
+    const Eigen::Quaterniond first(mean_(0, 3), mean_(0, 0), mean_(0, 1), mean_(0, 2));
+    const Eigen::Vector3d start =
+        geometry::LogSo3((base_R_frame * first).conjugate() * situation.base_T_start->rotation);
+    vectors += of_start_ * start.transpose();
+    const Eigen::RowVector3d missing = start.transpose() - vectors.row(0);
+    vectors += start_share_ * missing;
   }
-  const Eigen::Matrix3Xd vectors = WeightedBlocks(cross, duals_);
-  const Eigen::Vector3d missing = start - vectors.col(0);
-  std::vector<Eigen::Quaterniond> rotations;
-  rotations.reserve(mean_.size());
-  for (Eigen::Index i = 0; i < vectors.cols(); ++i) {
-    Eigen::Vector3d vector = vectors.col(i);
-    if (start_known) vector += start_share_[i] * missing;
-    rotations.push_back(base_R_frame * mean_[static_cast<std::size_t>(i)] *
-                        geometry::ExpSo3(vector));
-  }
-  return rotations;
+  return Turned(base_R_frame, mean_, vectors);
 }
 
 }  // namespace exemplar::learning

@@ -8,6 +8,7 @@
 #include "block_kriging.hpp"
 #include "exemplars.hpp"
 #include "path_frames.hpp"
+#include "weighted_sum.hpp"
 
 namespace exemplar::learning {
 
@@ -16,28 +17,29 @@ class RotationFrames {
   /// `path`: the positions' model of the same exemplars. Precondition: exemplars.has_tool.
   RotationFrames(const Exemplars& exemplars, const PathFrames& path);
 
-  /// One a frame, base frame. Begins at the situation's start orientation where that is given.
-  std::vector<Eigen::Quaterniond> Predict(const Situation& situation,
-                                          const FrameSituation& where) const;
+  /// One a frame (x y z w), base frame. Begins at the situation's start orientation where that is
+  /// given.
+  Eigen::MatrixX4d Predict(const Situation& situation, const FrameSituation& where) const;
   bool turns_with_object() const { return with_object_; }
   /// The trials never turned the object: which frame the orientation keeps to is assumed.
   bool assumed() const { return assumed_; }
 
  private:
   struct Fitted;
-  Eigen::Matrix3d Covariance(const Eigen::Vector3d& start_a, const FrameSituation& a,
-                             const Eigen::Vector3d& start_b, const FrameSituation& b,
-                             double residual) const;
+  /// The covariance of two trials is kStartGain start_a start_b^T and this on the diagonal.
+  double Diagonal(const FrameSituation& a, const FrameSituation& b, double residual) const;
 
   bool with_object_ = false;
   bool assumed_ = false;
   int target_ = -1;
   double length_m_ = 1;
   double residual_ = 0;
-  std::vector<Eigen::Quaterniond> mean_;  // in the chosen frame, one a frame
-  Eigen::VectorXd first_;                 // 3n: rotation vectors from the mean at the first frame
+  Eigen::MatrixX4d mean_;  // in the chosen frame, one a frame
   std::vector<FrameSituation> situations_;
-  Eigen::MatrixXd duals_;  // 3n x frames: inverse covariance times rotation vectors
+  // Inverse covariance times rotation vectors, x y z of all frames a column: of each trial, or of
+  // their sum where all trials count the same.
+  Streams duals_;
+  Eigen::VectorXd of_start_;  // frames: how far the vectors go with the start's
   Eigen::VectorXd start_share_;
 };
 

@@ -42,12 +42,12 @@ json FromUniform(const UniformTrial& trial) {
 UniformTrial ToUniform(const json& j) {
   UniformTrial trial;
   trial.id = j.at("id").get<std::string>();
-  trial.time_s = j.at("time_s").get<std::vector<double>>();
+  trial.time_s = ToNumbers(j.at("time_s"));
   trial.joint_names = j.at("joint_names").get<std::vector<std::string>>();
   trial.joints = ToMatrix(j.at("joints"));
   trial.base_T_tool = ToPoses(j.at("base_T_tool"));
   trial.has_orientation = j.at("has_orientation").get<bool>();
-  trial.hand_open = j.at("hand_open").get<std::vector<double>>();
+  trial.hand_open = ToNumbers(j.at("hand_open"));
   trial.touch_n = ToVector(j.at("touch_n"));
   for (const json& object : j.at("objects")) {
     trial.object_names.push_back(object.at("name").get<std::string>());
@@ -72,6 +72,8 @@ json FromSegmentation(const Segmentation& segmentation) {
           {"touch_term", FromVector(segmentation.touch_term)},
           {"c", segmentation.c},
           {"k", segmentation.k},
+          {"c_along", FromVector(segmentation.c_along)},
+          {"high_along", FromVector(segmentation.high_along)},
           {"c_tactile", segmentation.c_tactile},
           {"c_replaced", segmentation.c_replaced},
           {"markers", std::move(markers)}};
@@ -83,6 +85,8 @@ Segmentation ToSegmentation(const json& j) {
   segmentation.touch_term = ToVector(j.at("touch_term"));
   segmentation.c = j.at("c").get<double>();
   segmentation.k = j.at("k").get<double>();
+  if (j.contains("c_along")) segmentation.c_along = ToVector(j.at("c_along"));
+  if (j.contains("high_along")) segmentation.high_along = ToVector(j.at("high_along"));
   segmentation.c_tactile = j.at("c_tactile").get<double>();
   segmentation.c_replaced = j.at("c_replaced").get<bool>();
   for (const json& marker : j.at("markers")) {
@@ -108,6 +112,7 @@ json FromAlignment(const Alignment& alignment) {
   }
   return {{"time_s", alignment.time_s},
           {"knots_s", alignment.knots_s},
+          {"markers_s", alignment.markers_s},
           {"trials", std::move(trials)},
           {"canonical_joints", FromMatrix(alignment.canonical_joints)},
           {"canonical_tool", FromMatrix(alignment.canonical_tool)},
@@ -118,14 +123,15 @@ json FromAlignment(const Alignment& alignment) {
 
 Alignment ToAlignment(const json& j) {
   Alignment alignment;
-  alignment.time_s = j.at("time_s").get<std::vector<double>>();
-  alignment.knots_s = j.at("knots_s").get<std::vector<double>>();
+  alignment.time_s = ToNumbers(j.at("time_s"));
+  alignment.knots_s = ToNumbers(j.at("knots_s"));
+  alignment.markers_s = j.contains("markers_s") ? ToNumbers(j.at("markers_s")) : alignment.knots_s;
   for (const json& trial : j.at("trials")) {
     alignment.trials.push_back({.id = trial.at("id").get<std::string>(),
                                 .own = ToUniform(trial.at("own")),
                                 .segmentation = ToSegmentation(trial.at("segmentation")),
                                 .chosen = trial.at("chosen").get<std::vector<int>>(),
-                                .own_knots_s = trial.at("own_knots_s").get<std::vector<double>>(),
+                                .own_knots_s = ToNumbers(trial.at("own_knots_s")),
                                 .warped = ToUniform(trial.at("warped"))});
   }
   alignment.canonical_joints = ToMatrix(j.at("canonical_joints"));
@@ -156,7 +162,7 @@ SkillReport::TrialPart ToPart(const json& j) {
           .source = j.at("source").get<std::string>(),
           .duration_s = j.at("duration_s").get<double>(),
           .candidates = j.at("candidates").get<int>(),
-          .markers_s = j.at("markers_s").get<std::vector<double>>(),
+          .markers_s = ToNumbers(j.at("markers_s")),
           .c = j.at("c").get<double>(),
           .k = j.at("k").get<double>(),
           .cutoff_hz = j.at("cutoff_hz").get<double>(),
@@ -176,8 +182,25 @@ MethodScore ToScore(const json& j) {
   return {.method = j.at("method").get<std::string>(),
           .frechet_m = j.at("frechet_m").get<double>(),
           .end_error_m = j.at("end_error_m").get<double>(),
-          .frechet_by_trial_m = j.at("frechet_by_trial_m").get<std::vector<double>>(),
+          .frechet_by_trial_m = ToNumbers(j.at("frechet_by_trial_m")),
           .chosen = j.at("chosen").get<bool>()};
+}
+
+json FromContact(const SkillReport::ContactPart& part) {
+  const Eigen::Vector3d& p = part.object_p_contact;
+  return {{"object", part.object},     {"begin_s", part.begin_s},
+          {"end_s", part.end_s},       {"object_p_contact", {p.x(), p.y(), p.z()}},
+          {"spread_m", part.spread_m}, {"touch_measured", part.touch_measured}};
+}
+
+SkillReport::ContactPart ToContact(const json& j) {
+  const auto p = j.at("object_p_contact").get<std::array<double, 3>>();
+  return {.object = j.at("object").get<std::string>(),
+          .begin_s = j.at("begin_s").get<double>(),
+          .end_s = j.at("end_s").get<double>(),
+          .object_p_contact = Eigen::Vector3d(p[0], p[1], p[2]),
+          .spread_m = j.at("spread_m").get<double>(),
+          .touch_measured = j.at("touch_measured").get<bool>()};
 }
 
 json FromOptional(const std::optional<double>& value) {
@@ -199,12 +222,23 @@ SkillReport ToReport(const json& j) {
   report.duration_s = j.at("duration_s").get<double>();
   report.joint_names = j.at("joint_names").get<std::vector<std::string>>();
   for (const json& trial : j.at("trials")) report.trials.push_back(ToPart(trial));
-  report.markers_s = j.at("markers_s").get<std::vector<double>>();
+  report.markers_s = ToNumbers(j.at("markers_s"));
   report.contact_begin_s = ToOptional(j.at("contact_begin_s"));
   report.contact_end_s = ToOptional(j.at("contact_end_s"));
   const auto contact = j.at("target_p_contact").get<std::array<double, 3>>();
   report.target_p_contact = Eigen::Vector3d(contact[0], contact[1], contact[2]);
   report.contact_spread_m = j.at("contact_spread_m").get<double>();
+  if (j.contains("contacts")) {
+    for (const json& part : j.at("contacts")) report.contacts.push_back(ToContact(part));
+  } else if (report.contact_begin_s && report.contact_end_s) {
+    // A skill that was stored before all were named.
+    report.contacts.push_back({.object = report.target,
+                               .begin_s = *report.contact_begin_s,
+                               .end_s = *report.contact_end_s,
+                               .object_p_contact = report.target_p_contact,
+                               .spread_m = report.contact_spread_m,
+                               .touch_measured = false});
+  }
   report.mean_correlation = j.at("mean_correlation").get<double>();
   report.plain_correlation = j.at("plain_correlation").get<double>();
   for (const json& score : j.at("methods")) report.methods.push_back(ToScore(score));
@@ -249,6 +283,10 @@ json ToJson(const SkillReport& report) {
   for (const SkillReport::TrialPart& part : report.trials) trials.push_back(FromPart(part));
   json methods = json::array();
   for (const MethodScore& score : report.methods) methods.push_back(FromScore(score));
+  json contacts = json::array();
+  for (const SkillReport::ContactPart& part : report.contacts) {
+    contacts.push_back(FromContact(part));
+  }
   const Eigen::Vector3d& contact = report.target_p_contact;
   return {{"skill", report.skill},
           {"version", report.version},
@@ -260,6 +298,7 @@ json ToJson(const SkillReport& report) {
           {"joint_names", report.joint_names},
           {"trials", std::move(trials)},
           {"markers_s", report.markers_s},
+          {"contacts", std::move(contacts)},
           {"contact_begin_s", FromOptional(report.contact_begin_s)},
           {"contact_end_s", FromOptional(report.contact_end_s)},
           {"target_p_contact", {contact.x(), contact.y(), contact.z()}},

@@ -1,113 +1,109 @@
 #include "weighted_sum.hpp"
 
+#include <algorithm>
 #include <cassert>
-#include <cstring>
+
+#include "exemplar/geometry/wide.hpp"
 
 namespace exemplar::learning {
 namespace {
 
-// Four doubles that the compiler keeps in one register or in two, as the target allows.
-typedef double Four __attribute__((vector_size(32)));
+using geometry::Four;
+using geometry::HasWide;
+using geometry::Load;
+using geometry::Store;
 
-#define EXEMPLAR_INLINE inline __attribute__((always_inline))
+constexpr Eigen::Index kTile = 8;
 
-EXEMPLAR_INLINE void Load(const double* from, Four& to) { std::memcpy(&to, from, sizeof(Four)); }
-EXEMPLAR_INLINE void Store(const Four& from, double* to) { std::memcpy(to, &from, sizeof(Four)); }
-
-struct Columns {
+struct Tiles {
   const double* data;
-  Eigen::Index rows, count;
+  Eigen::Index tiles, count;
 };
 
-EXEMPLAR_INLINE void SumColumns(const Columns& columns, const double* weights, double* sum) {
-  Eigen::Index row = 0;
-  for (; row + 8 <= columns.rows; row += 8) {
+EXEMPLAR_INLINE void SumTiles(const Tiles& from, const double* weights, double* sum) {
+  const double* at = from.data;
+  for (Eigen::Index tile = 0; tile < from.tiles; ++tile, sum += kTile) {
     Four first = {}, second = {};
-    const double* at = columns.data + row;
-    for (Eigen::Index k = 0; k < columns.count; ++k, at += columns.rows) {
+    for (Eigen::Index k = 0; k < from.count; ++k, at += kTile) {
       Four a, b;
       Load(at, a);
       Load(at + 4, b);
       first += weights[k] * a;
       second += weights[k] * b;
     }
-    Store(first, sum + row);
-    Store(second, sum + row + 4);
-  }
-  for (; row < columns.rows; ++row) {
-    sum[row] = 0;
-    for (Eigen::Index k = 0; k < columns.count; ++k) {
-      sum[row] += weights[k] * columns.data[k * columns.rows + row];
-    }
+    Store(first, sum);
+    Store(second, sum + 4);
   }
 }
 
-// `weights`: three rows of `values.rows` each, one after the other.
-EXEMPLAR_INLINE void SumBlocks(const Columns& values, const double* weights, double* sum) {
-  const Eigen::Index m = values.rows;
-  for (Eigen::Index column = 0; column < values.count; ++column, sum += 3) {
-    const double* at = values.data + column * m;
-    Four x = {}, y = {}, z = {};
-    Eigen::Index k = 0;
-    for (; k + 4 <= m; k += 4) {
-      Four value, wx, wy, wz;
-      Load(at + k, value);
-      Load(weights + k, wx);
-      Load(weights + m + k, wy);
-      Load(weights + 2 * m + k, wz);
-      x += wx * value;
-      y += wy * value;
-      z += wz * value;
+// `weights`: x of all columns, then y, then z; `sum`: likewise, `stride` numbers apart.
+EXEMPLAR_INLINE void SumTiles3(const Tiles& from, const double* weights, double* sum,
+                               Eigen::Index stride) {
+  const double* at = from.data;
+  for (Eigen::Index tile = 0; tile < from.tiles; ++tile, sum += kTile) {
+    Four x1 = {}, x2 = {}, y1 = {}, y2 = {}, z1 = {}, z2 = {};
+    for (Eigen::Index k = 0; k < from.count; ++k, at += kTile) {
+      Four a, b;
+      Load(at, a);
+      Load(at + 4, b);
+      x1 += weights[k] * a;
+      x2 += weights[k] * b;
+      y1 += weights[from.count + k] * a;
+      y2 += weights[from.count + k] * b;
+      z1 += weights[2 * from.count + k] * a;
+      z2 += weights[2 * from.count + k] * b;
     }
-    double rest[3] = {0, 0, 0};
-    for (; k < m; ++k) {
-      for (int axis = 0; axis < 3; ++axis) rest[axis] += weights[axis * m + k] * at[k];
-    }
-    sum[0] = rest[0] + (x[0] + x[1]) + (x[2] + x[3]);
-    sum[1] = rest[1] + (y[0] + y[1]) + (y[2] + y[3]);
-    sum[2] = rest[2] + (z[0] + z[1]) + (z[2] + z[3]);
+    Store(x1, sum);
+    Store(x2, sum + 4);
+    Store(y1, sum + stride);
+    Store(y2, sum + stride + 4);
+    Store(z1, sum + 2 * stride);
+    Store(z2, sum + 2 * stride + 4);
   }
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx2,fma"))) void SumColumnsWide(const Columns& columns,
-                                                        const double* weights, double* sum) {
-  SumColumns(columns, weights, sum);
+EXEMPLAR_WIDE void SumTilesWide(const Tiles& from, const double* weights, double* sum) {
+  SumTiles(from, weights, sum);
 }
-__attribute__((target("avx2,fma"))) void SumBlocksWide(const Columns& values, const double* weights,
-                                                       double* sum) {
-  SumBlocks(values, weights, sum);
-}
-bool HasWide() {
-  static const bool has = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return has;
-}
-#else
-void SumColumnsWide(const Columns&, const double*, double*) {}
-void SumBlocksWide(const Columns&, const double*, double*) {}
-bool HasWide() { return false; }
-#endif
-
-Columns ColumnsOf(const Eigen::MatrixXd& matrix) {
-  return {matrix.data(), matrix.rows(), matrix.cols()};
+EXEMPLAR_WIDE void SumTiles3Wide(const Tiles& from, const double* weights, double* sum,
+                                 Eigen::Index stride) {
+  SumTiles3(from, weights, sum, stride);
 }
 
 }  // namespace
 
-Eigen::VectorXd WeightedSum(const Eigen::MatrixXd& columns,
-                            const Eigen::Ref<const Eigen::VectorXd>& weights) {
-  assert(columns.cols() == weights.size());
-  Eigen::VectorXd sum(columns.rows());
-  (HasWide() ? SumColumnsWide : SumColumns)(ColumnsOf(columns), weights.data(), sum.data());
+Streams::Streams(const Eigen::Ref<const Eigen::MatrixXd>& columns)
+    : rows_(columns.rows()), count_(columns.cols()) {
+  const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
+  tiles_.resize(static_cast<std::size_t>(tiles * count_));
+  auto to = tiles_.begin();
+  for (Eigen::Index row = 0; row < rows_; row += kTile) {
+    const Eigen::Index used = std::min(kTile, rows_ - row);
+    for (Eigen::Index k = 0; k < count_; ++k, ++to) {
+      for (Eigen::Index r = 0; r < used; ++r) to->values[r] = columns(row + r, k);
+    }
+  }
+}
+
+Eigen::VectorXd Streams::Sum(const Eigen::Ref<const Eigen::VectorXd>& weights) const {
+  assert(weights.size() == count_);
+  if (tiles_.empty()) return Eigen::VectorXd::Zero(rows_);
+  const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
+  Eigen::VectorXd sum(tiles * kTile);
+  (HasWide() ? SumTilesWide : SumTiles)({tiles_.front().values, tiles, count_}, weights.data(),
+                                        sum.data());
+  sum.conservativeResize(rows_);
   return sum;
 }
 
-Eigen::Matrix3Xd WeightedBlocks(const Eigen::Ref<const Eigen::Matrix3Xd>& weights,
-                                const Eigen::MatrixXd& values) {
-  assert(weights.cols() == values.rows());
-  const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> rows = weights;
-  Eigen::Matrix3Xd sum(3, values.cols());
-  (HasWide() ? SumBlocksWide : SumBlocks)(ColumnsOf(values), rows.data(), sum.data());
+Eigen::MatrixX3d Streams::Sum3(const Eigen::Ref<const Eigen::MatrixX3d>& weights) const {
+  assert(weights.rows() == count_ && weights.outerStride() == count_);
+  if (tiles_.empty()) return Eigen::MatrixX3d::Zero(rows_, 3);
+  const Eigen::Index tiles = (rows_ + kTile - 1) / kTile;
+  Eigen::MatrixX3d sum(tiles * kTile, 3);
+  (HasWide() ? SumTiles3Wide : SumTiles3)({tiles_.front().values, tiles, count_}, weights.data(),
+                                          sum.data(), tiles * kTile);
+  if (sum.rows() != rows_) sum.conservativeResize(rows_, 3);
   return sum;
 }
 

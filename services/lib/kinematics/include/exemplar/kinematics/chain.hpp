@@ -27,11 +27,15 @@ class Chain final : public demonstration::ToolKinematics {
   const std::vector<JointLimits>& limits() const { return limits_; }
   const std::string& base_link() const { return base_link_; }
   const std::string& tip_link() const { return tip_link_; }
+  /// Whether mimic joints make one variable move several joints of the chain.
+  bool has_shared_joints() const { return steps_.size() != names_.size(); }
   /// Indices into RobotModel::joints, base to tip.
   const std::vector<int>& joint_indices() const { return joint_indices_; }
 
   /// base_T_tip at q (n = dof()).
   geometry::Pose ToolPose(const Eigen::Ref<const Eigen::VectorXd>& q) const override;
+  /// Four rows at a time.
+  Path ToolPath(const Eigen::MatrixXd& joints) const override;
   /// base_T_tip and the geometric Jacobian (6 x n): rows 0-2 linear velocity of the tip's origin,
   /// 3-5 angular velocity, both in the base frame. Does not allocate.
   geometry::Pose ToolPoseAndJacobian(
