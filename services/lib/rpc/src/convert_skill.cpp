@@ -39,6 +39,15 @@ void ToProto(const learning::SkillReport& report, v1::SkillReport* message) {
     ToProto(score.frechet_by_trial_m, out->mutable_frechet_by_trial_m());
     out->set_chosen(score.chosen);
   }
+  for (const learning::SkillReport::ContactPart& contact : report.contacts) {
+    v1::SkillReport::ContactPart* out = message->add_contacts();
+    out->set_object(Utf8(contact.object));
+    out->set_begin_s(contact.begin_s);
+    out->set_end_s(contact.end_s);
+    ToProto(contact.object_p_contact, out->mutable_point());
+    out->set_spread_m(contact.spread_m);
+    out->set_touch_measured(contact.touch_measured);
+  }
   ToProto(report.notes, message->mutable_notes());
   ToProto(report.warnings, message->mutable_warnings());
 }
@@ -84,6 +93,15 @@ Result<learning::SkillReport> FromProto(const v1::SkillReport& message) {
     score.end_error_m = in.end_error_m();
     score.frechet_by_trial_m = FromProto(in.frechet_by_trial_m());
     score.chosen = in.chosen();
+  }
+  for (const v1::SkillReport::ContactPart& in : message.contacts()) {
+    learning::SkillReport::ContactPart& contact = report.contacts.emplace_back();
+    contact.object = in.object();
+    contact.begin_s = in.begin_s();
+    contact.end_s = in.end_s();
+    contact.object_p_contact = FromProto(in.point());
+    contact.spread_m = in.spread_m();
+    contact.touch_measured = in.touch_measured();
   }
   report.notes = FromProto(message.notes());
   report.warnings = FromProto(message.warnings());
@@ -168,17 +186,21 @@ Result<demonstration::SkillQuery> FromProto(const v1::SkillQuery& message, std::
 }
 
 void ToProto(const demonstration::SkillMotion& motion, v1::SkillMotion* message) {
-  message->set_skill(Utf8(motion.skill));
-  message->set_version(motion.version);
+  ToProtoWithoutArrays(motion, message);
   ToProto(motion.time_s, message->mutable_time_s());
-  ToProto(motion.joint_names, message->mutable_joint_names());
   MatrixToProto(motion.joints, message->mutable_joints());
   PosesToProto(motion.base_T_tool, message->mutable_tool());
-  message->set_has_orientation(motion.has_orientation);
   ToProto(motion.hand_open, message->mutable_hand_open());
-  ToProto(motion.object_names, message->mutable_object_names());
   MatrixToProto(motion.objectivity, message->mutable_objectivity());
   ToProto(motion.sigma_m, message->mutable_sigma_m());
+}
+
+void ToProtoWithoutArrays(const demonstration::SkillMotion& motion, v1::SkillMotion* message) {
+  message->set_skill(Utf8(motion.skill));
+  message->set_version(motion.version);
+  ToProto(motion.joint_names, message->mutable_joint_names());
+  message->set_has_orientation(motion.has_orientation);
+  ToProto(motion.object_names, message->mutable_object_names());
   ToProto(motion.markers_s, message->mutable_markers_s());
   for (const demonstration::Contact& contact : motion.contacts) {
     v1::Contact* out = message->add_contacts();

@@ -17,6 +17,8 @@ void ToProto(const demonstration::SkillQuery& query, v1::SkillQuery* message);
 Result<demonstration::SkillQuery> FromProto(const v1::SkillQuery& message, std::string_view field);
 
 void ToProto(const demonstration::SkillMotion& motion, v1::SkillMotion* message);
+/// All but the arrays with a value or more a frame.
+void ToProtoWithoutArrays(const demonstration::SkillMotion& motion, v1::SkillMotion* message);
 Result<demonstration::SkillMotion> FromProto(const v1::SkillMotion& message,
                                              std::string_view field);
 

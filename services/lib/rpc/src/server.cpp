@@ -11,6 +11,7 @@
 
 #include "exemplar/base/text.hpp"
 #include "server_call.hpp"
+#include "server_settings.hpp"
 
 namespace exemplar::rpc {
 namespace {
@@ -65,15 +66,7 @@ class GrpcServer final : public Server {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
-    // Two servers on one port would share its callers at random.
-    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
-    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
-    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
-    // Threads that wait for calls stay: else each call that takes the last one starts another.
-    builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
-    builder.SetSyncServerOption(grpc::ServerBuilder::MIN_POLLERS, 2);
-    builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 8);
+    ApplySettings(builder);
     builder.SetMaxReceiveMessageSize(static_cast<int>(options.max_message_bytes));
     builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port_);
     for (const auto& service : services_) builder.RegisterService(service.get());

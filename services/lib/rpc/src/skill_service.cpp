@@ -1,16 +1,32 @@
 #include "convert_skill.hpp"
-#include "exemplar/v1/skill.grpc.pb.h"
+#include "convert_suggest.hpp"
+#include "method_table.hpp"
+#include "motion_wire.hpp"
 #include "server_call.hpp"
 
 namespace exemplar::rpc {
 namespace {
 
-class SkillService final : public v1::SkillService::Service {
+/// As skill.proto has it, but that motions leave as bytes that motion_wire writes.
+class SkillService final : public MethodTable<SkillService> {
  public:
-  SkillService(ServerShared& shared, api::SkillApi& skills) : shared_(shared), skills_(skills) {}
+  SkillService(ServerShared& shared, api::SkillApi& skills) : shared_(shared), skills_(skills) {
+    Add("/exemplar.v1.SkillService/Learn", &SkillService::Learn);
+    Add("/exemplar.v1.SkillService/Get", &SkillService::Get);
+    Add("/exemplar.v1.SkillService/List", &SkillService::List);
+    Add("/exemplar.v1.SkillService/Versions", &SkillService::Versions);
+    Add("/exemplar.v1.SkillService/Rollback", &SkillService::Rollback);
+    Add("/exemplar.v1.SkillService/Query", &SkillService::Query);
+    Add("/exemplar.v1.SkillService/QueryStream", &SkillService::QueryStream);
+    Add("/exemplar.v1.SkillService/Evaluate", &SkillService::Evaluate);
+    Add("/exemplar.v1.SkillService/Suggest", &SkillService::Suggest);
+    Add("/exemplar.v1.SkillService/Delete", &SkillService::Delete);
+    Add("/exemplar.v1.SkillService/Export", &SkillService::Export);
+  }
 
+ private:
   grpc::Status Learn(grpc::ServerContext* context, const v1::LearnSkillRequest* request,
-                     grpc::ServerWriter<v1::LearnSkillResponse>* writer) override {
+                     grpc::ServerWriter<v1::LearnSkillResponse>* writer) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Learn", [&]() -> Status {
       CancellationWatch watch(shared_, *context);
       LatestWriter<v1::LearnSkillResponse> progress(*writer, watch);
@@ -33,7 +49,7 @@ class SkillService final : public v1::SkillService::Service {
   }
 
   grpc::Status Get(grpc::ServerContext* context, const v1::GetSkillRequest* request,
-                   v1::GetSkillResponse* response) override {
+                   v1::GetSkillResponse* response) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Get", [&]() -> Status {
       const Result<learning::SkillReport> report =
           skills_.Show(request->skill().name(), request->skill().version());
@@ -44,7 +60,7 @@ class SkillService final : public v1::SkillService::Service {
   }
 
   grpc::Status List(grpc::ServerContext* context, const v1::ListSkillsRequest*,
-                    v1::ListSkillsResponse* response) override {
+                    v1::ListSkillsResponse* response) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/List", [&]() -> Status {
       const Result<std::vector<api::SkillInfo>> list = skills_.List();
       if (!list) return list.error();
@@ -54,7 +70,7 @@ class SkillService final : public v1::SkillService::Service {
   }
 
   grpc::Status Versions(grpc::ServerContext* context, const v1::ListSkillVersionsRequest* request,
-                        v1::ListSkillVersionsResponse* response) override {
+                        v1::ListSkillVersionsResponse* response) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Versions", [&]() -> Status {
       const Result<std::vector<api::VersionInfo>> versions = skills_.Versions(request->name());
       if (!versions) return versions.error();
@@ -64,31 +80,34 @@ class SkillService final : public v1::SkillService::Service {
   }
 
   grpc::Status Rollback(grpc::ServerContext* context, const v1::RollbackSkillRequest* request,
-                        v1::RollbackSkillResponse*) override {
+                        v1::RollbackSkillResponse*) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Rollback",
                  [&] { return skills_.Rollback(request->name(), request->version()); });
   }
 
   grpc::Status Query(grpc::ServerContext* context, const v1::QuerySkillRequest* request,
-                     v1::QuerySkillResponse* response) override {
+                     grpc::ByteBuffer* response) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Query", [&]() -> Status {
-      return Answer(request->skill(), request->query(), response->mutable_motion());
+      const Result<demonstration::SkillMotion> motion = Answer(request->skill(), request->query());
+      if (!motion) return motion.error();
+      *response = ResponseBytes(*motion);
+      return {};
     });
   }
 
-  grpc::Status QueryStream(grpc::ServerContext* context,
-                           grpc::ServerReaderWriter<v1::QuerySkillStreamResponse,
-                                                    v1::QuerySkillStreamRequest>* stream) override {
+  grpc::Status QueryStream(
+      grpc::ServerContext* context,
+      grpc::ServerReaderWriter<grpc::ByteBuffer, v1::QuerySkillStreamRequest>* stream) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/QueryStream", [&]() -> Status {
       v1::SkillVersion skill;
       v1::QuerySkillStreamRequest request;
       while (stream->Read(&request)) {
         if (request.has_skill()) skill = request.skill();
-        v1::QuerySkillStreamResponse response;
-        response.set_tag(request.tag());
-        const Status answered = Answer(skill, request.query(), response.mutable_motion());
-        if (!answered) ToProto(answered.error(), response.mutable_error());
-        if (!stream->Write(response)) return Error{ErrorCode::kCancelled, "the caller went away"};
+        const Result<demonstration::SkillMotion> motion = Answer(skill, request.query());
+        const bool written =
+            stream->Write(motion ? StreamResponseBytes(request.tag(), *motion)
+                                 : StreamResponseBytes(request.tag(), motion.error()));
+        if (!written) return Error{ErrorCode::kCancelled, "the caller went away"};
       }
       return {};
     });
@@ -96,7 +115,7 @@ class SkillService final : public v1::SkillService::Service {
 
   grpc::Status Evaluate(grpc::ServerContext* context,
                         grpc::ServerReader<v1::EvaluateSkillRequest>* reader,
-                        v1::EvaluateSkillResponse* response) override {
+                        v1::EvaluateSkillResponse* response) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Evaluate", [&]() -> Status {
       v1::EvaluateSkillRequest::Header header;
       std::string file;
@@ -109,14 +128,27 @@ class SkillService final : public v1::SkillService::Service {
     });
   }
 
+  grpc::Status Suggest(grpc::ServerContext* context, const v1::SuggestSkillRequest* request,
+                       v1::SuggestSkillResponse* response) {
+    return Serve(shared_, *context, "exemplar.v1.SkillService/Suggest", [&]() -> Status {
+      learning::SuggestOptions options;
+      if (request->count() != 0) options.count = request->count();
+      const Result<learning::Suggestions> suggestions =
+          skills_.Suggest(request->skill().name(), request->skill().version(), options);
+      if (!suggestions) return suggestions.error();
+      ToProto(*suggestions, response);
+      return {};
+    });
+  }
+
   grpc::Status Delete(grpc::ServerContext* context, const v1::DeleteSkillRequest* request,
-                      v1::DeleteSkillResponse*) override {
+                      v1::DeleteSkillResponse*) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Delete",
                  [&] { return skills_.Delete(request->name()); });
   }
 
   grpc::Status Export(grpc::ServerContext* context, const v1::ExportSkillRequest* request,
-                      grpc::ServerWriter<v1::ExportSkillResponse>* writer) override {
+                      grpc::ServerWriter<v1::ExportSkillResponse>* writer) {
     return Serve(shared_, *context, "exemplar.v1.SkillService/Export", [&]() -> Status {
       const Result<std::string> json =
           skills_.ExportJson(request->skill().name(), request->skill().version());
@@ -125,7 +157,6 @@ class SkillService final : public v1::SkillService::Service {
     });
   }
 
- private:
   /// Fields as the request has them: the interface's arguments lie in two of its messages.
   static Error WithRequestField(Error error) {
     if (error.field == "name" || error.field == "version") {
@@ -136,15 +167,14 @@ class SkillService final : public v1::SkillService::Service {
     return error;
   }
 
-  Status Answer(const v1::SkillVersion& skill, const v1::SkillQuery& message,
-                v1::SkillMotion* answer) {
+  Result<demonstration::SkillMotion> Answer(const v1::SkillVersion& skill,
+                                            const v1::SkillQuery& message) {
     const Result<demonstration::SkillQuery> query = FromProto(message, "query");
     if (!query) return query.error();
-    const Result<demonstration::SkillMotion> motion =
+    Result<demonstration::SkillMotion> motion =
         skills_.Query(skill.name(), skill.version(), *query);
     if (!motion) return WithRequestField(motion.error());
-    ToProto(*motion, answer);
-    return {};
+    return motion;
   }
 
   ServerShared& shared_;
