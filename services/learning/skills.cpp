@@ -1,8 +1,13 @@
 #include "learning/skills.hpp"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <thread>
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/learning/inspection.hpp"
@@ -18,10 +23,22 @@ std::string Place(const std::string& name, int version) {
   return "skill \"" + name + "\" version " + std::to_string(version);
 }
 
-std::string ToCbor(const learning::Skill& skill) {
-  std::string document;
-  nlohmann::json::to_cbor(learning::ToJson(skill), document);
-  return document;
+/// Older versions of skills that are kept in memory, of all skills together.
+constexpr std::size_t kOlderVersions = 16;
+
+/// Runs `work` on a thread that gives way to those that answer queries. What it throws is thrown
+/// here.
+template <class Work>
+auto RunBehindOthers(const Work& work) {
+  std::packaged_task<decltype(work())()> task([&work] {
+    // A niceness of this thread alone; where it is refused, it runs as the others do.
+    constexpr int kNiceness = 10;
+    static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness));
+    return work();
+  });
+  auto result = task.get_future();
+  std::thread(std::move(task)).join();
+  return result.get();
 }
 
 std::vector<std::string> TrialIds(const learning::SkillReport& report) {
@@ -59,7 +76,12 @@ class Skills::Claim {
 
 Skills::Skills(Store& store, Trials& trials, const Clock& clock,
                std::shared_ptr<const demonstration::ToolKinematics> tool, Log& log)
-    : store_(store), trials_(trials), clock_(clock), tool_(std::move(tool)), log_(log) {
+    : store_(store),
+      trials_(trials),
+      clock_(clock),
+      tool_(std::move(tool)),
+      log_(log),
+      older_(kOlderVersions) {
   const Result<std::vector<api::SkillInfo>> all = store_.ListSkills();
   if (!all) {
     log_.Error("skills cannot be listed", {{"error", all.error().message}});
@@ -85,11 +107,7 @@ Result<learning::Skill> Skills::FromStore(const std::string& name, int version) 
   const Result<std::optional<std::string>> document = store_.Document(name, version);
   if (!document) return document.error();
   if (!*document) return NotFound("there is no " + Place(name, version), "version");
-  const nlohmann::json json = nlohmann::json::from_cbor(**document, true, false);
-  if (json.is_discarded()) {
-    return Error{ErrorCode::kDataLoss, Place(name, version) + " is damaged in the store"};
-  }
-  Result<learning::Skill> skill = learning::SkillFromJson(json, tool_);
+  Result<learning::Skill> skill = learning::SkillFromBytes(**document, tool_);
   if (!skill) return WithPlace(skill.error(), Place(name, version));
   return skill;
 }
@@ -102,12 +120,16 @@ Result<learning::Skill> Skills::Find(const std::string& name, int version) {
       return found->second;
     }
   }
+  if (std::optional<learning::Skill> kept = older_.Find(name, version)) return *std::move(kept);
+  const std::uint64_t epoch = older_.epoch();
   const Result<std::vector<api::VersionInfo>> versions = store_.ListVersions(name);
   if (!versions) return versions.error();
   if (versions->empty()) return NoSuchSkill(name);
   for (const api::VersionInfo& info : *versions) {
     if (info.version == version || (version == 0 && info.current)) {
-      return FromStore(name, info.version);
+      Result<learning::Skill> skill = FromStore(name, info.version);
+      if (skill) older_.Insert(name, *skill, epoch);
+      return skill;
     }
   }
   return NotFound("skill \"" + name + "\" has no version " + std::to_string(version) +
@@ -171,10 +193,18 @@ Result<learning::SkillReport> Skills::Learn(const std::string& name,
   }
   const Result<Claim> claim = Claim::Take(*this, name);
   if (!claim) return claim.error();
-  const Result<std::vector<learning::NamedTrial>> trials = LoadTrials(name, *read, progress, stop);
+  return RunBehindOthers([&] { return LearnClaimed(name, *read, progress, stop); });
+}
+
+Result<learning::SkillReport> Skills::LearnClaimed(const std::string& name,
+                                                   const learning::LearnOptions& options,
+                                                   const learning::Progress& progress,
+                                                   const std::stop_token& stop) {
+  const Result<std::vector<learning::NamedTrial>> trials =
+      LoadTrials(name, options, progress, stop);
   if (!trials) return trials.error();
   const Result<learning::Skill> learned = learning::LearnSkill(
-      *trials, *read, tool_,
+      *trials, options, tool_,
       [&](double fraction, std::string_view step) {
         if (progress) progress(kLoaded + (kLearned - kLoaded) * fraction, step);
       },
@@ -194,7 +224,7 @@ Result<learning::SkillReport> Skills::Learn(const std::string& name,
                                       .learned = clock_.Now()},
                              .target = report.target,
                              .options = report.options,
-                             .document = ToCbor(skill)};
+                             .document = learning::ToBytes(skill)};
   // The last chance to turn back: from here on the version is there.
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "learning was cancelled"};
   if (const Status added = store_.AddVersion(stored); !added) return added.error();
@@ -236,6 +266,7 @@ Status Skills::Delete(const std::string& name) {
   const Result<bool> deleted = store_.DeleteSkill(name);
   if (!deleted) return deleted.error();
   if (!*deleted) return NoSuchSkill(name);
+  older_.Forget(name);
   const std::unique_lock lock(current_mutex_);
   current_.erase(name);
   return {};
@@ -255,6 +286,13 @@ Result<learning::Evaluation> Skills::Evaluate(const std::string& name, int versi
   const Result<demonstration::Trial> trial = trials_.Read(file_name, file);
   if (!trial) return trial.error();
   return learning::Evaluate(*skill, *trial);
+}
+
+Result<learning::Suggestions> Skills::Suggest(const std::string& name, int version,
+                                              const learning::SuggestOptions& options) {
+  const Result<learning::Skill> skill = Find(name, version);
+  if (!skill) return skill.error();
+  return learning::Suggest(*skill, options);
 }
 
 Result<std::string> Skills::ExportJson(const std::string& name, int version) {

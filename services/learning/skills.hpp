@@ -9,13 +9,15 @@
 #include "exemplar/api/services.hpp"
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
+#include "learning/skill_cache.hpp"
 #include "learning/store.hpp"
 #include "learning/trials.hpp"
 
 namespace exemplar::learning_service {
 
-/// The skills. Current versions are kept in memory as immutable values that are exchanged whole, so
-/// that a query waits for nobody. Thread-safe.
+/// The skills. Current versions, and the older ones that were asked for last, are kept in memory as
+/// immutable values that are exchanged whole, so that a query waits for nobody. Learning runs on
+/// threads of its own that give way to all others. Thread-safe.
 class Skills final : public api::SkillApi {
  public:
   /// Loads the current version of every stored skill; one that is damaged is logged, and its
@@ -38,11 +40,18 @@ class Skills final : public api::SkillApi {
                                            const demonstration::SkillQuery& query) override;
   Result<learning::Evaluation> Evaluate(const std::string& name, int version,
                                         const std::string& file_name, std::string file) override;
+  Result<learning::Suggestions> Suggest(const std::string& name, int version,
+                                        const learning::SuggestOptions& options) override;
   Result<std::string> ExportJson(const std::string& name, int version) override;
 
  private:
   class Claim;  ///< of the right to change one skill
 
+  /// Precondition: the claim of `name` is held.
+  Result<learning::SkillReport> LearnClaimed(const std::string& name,
+                                             const learning::LearnOptions& options,
+                                             const learning::Progress& progress,
+                                             const std::stop_token& stop);
   Result<std::vector<learning::NamedTrial>> LoadTrials(const std::string& skill,
                                                        const learning::LearnOptions& options,
                                                        const learning::Progress& progress,
@@ -64,6 +73,7 @@ class Skills final : public api::SkillApi {
 
   std::shared_mutex current_mutex_;  ///< held for a look-up or an exchange only
   std::unordered_map<std::string, learning::Skill> current_;
+  SkillCache older_;
 };
 
 }  // namespace exemplar::learning_service

@@ -42,6 +42,14 @@ CREATE TABLE versions (
   document BLOB NOT NULL,
   PRIMARY KEY (skill, version)
 ) STRICT;
+)sql",
+                                     R"sql(
+CREATE TABLE version_numbers (
+  skill TEXT PRIMARY KEY,
+  last INTEGER NOT NULL
+) STRICT;
+INSERT INTO version_numbers SELECT name, last FROM skills;
+ALTER TABLE skills DROP COLUMN last;
 )sql"};
 
 /// Makes the file ours to SQLite's `file` command and to Open: "Exmp".
@@ -232,7 +240,7 @@ Result<bool> Store::DeleteTrial(const std::string& id) {
 
 Result<int> Store::NextVersion(const std::string& skill) {
   const std::lock_guard lock(mutex_);
-  Statement statement = database_->Prepare("SELECT last FROM skills WHERE name = ?");
+  Statement statement = database_->Prepare("SELECT last FROM version_numbers WHERE skill = ?");
   const Result<bool> row = statement.Bind(skill).Step();
   if (!row) return row.error();
   return *row ? static_cast<int>(statement.Integer(0)) + 1 : 1;
@@ -243,14 +251,12 @@ Status Store::AddVersion(const StoredVersion& version) {
   const std::lock_guard lock(mutex_);
   Result<Transaction> transaction = Transaction::Begin(*database_);
   if (!transaction) return transaction.error();
-  if (Status named = database_
-                         ->Prepare("INSERT INTO skills (name, current, last) VALUES (?1, ?2, ?2)"
-                                   " ON CONFLICT (name) DO UPDATE SET current = ?2, last = ?2")
-                         .Bind(version.skill)
-                         .Bind(version.info.version)
-                         .Run();
-      !named) {
-    return named;
+  for (const char* sql : {"INSERT INTO skills (name, current) VALUES (?1, ?2)"
+                          " ON CONFLICT (name) DO UPDATE SET current = ?2",
+                          "INSERT INTO version_numbers (skill, last) VALUES (?1, ?2)"
+                          " ON CONFLICT (skill) DO UPDATE SET last = ?2"}) {
+    Status numbered = database_->Prepare(sql).Bind(version.skill).Bind(version.info.version).Run();
+    if (!numbered) return numbered;
   }
   if (Status added =
           database_

@@ -15,7 +15,7 @@
 
 namespace exemplar::learning_service {
 
-/// A skill version as stored. `document` is the skill in CBOR.
+/// A skill version as stored. `document` is what learning::ToBytes made of the skill.
 struct StoredVersion {
   std::string skill;
   api::VersionInfo info;
@@ -44,7 +44,8 @@ class Store {
   /// False: there was none.
   Result<bool> DeleteTrial(const std::string& id);
 
-  /// The number that AddVersion would take: never one that was used before.
+  /// The number that AddVersion would take: never one that was used before, be it of a skill of
+  /// that name that was deleted.
   Result<int> NextVersion(const std::string& skill);
   /// Adds it as the current version.
   Status AddVersion(const StoredVersion& version);

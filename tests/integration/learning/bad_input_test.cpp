@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <functional>
+#include <limits>
 #include <optional>
 #include <set>
 
@@ -160,22 +163,86 @@ TEST_F(BadInputTest, QueriesOfUnknownOrFarObjectsSaySo) {
   for (const geometry::Pose& pose : far->base_T_tool) EXPECT_TRUE(pose.translation.allFinite());
 }
 
+TEST_F(BadInputTest, QueriesThatCannotBeMeantAreRefusedByFieldAndValue) {
+  SubmitAllAndLearn();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  struct Case {
+    std::function<void(demonstration::SkillQuery&)> spoil;
+    std::string field, words;
+  };
+  const auto position = [](double x, double y, double z) {
+    return [=](demonstration::SkillQuery& q) {
+      q.objects[0].base_T_object.translation = {x, y, z};
+    };
+  };
+  const auto start = [](double x) {
+    return [=](demonstration::SkillQuery& q) {
+      q.start = geometry::Pose::FromTranslation({x, 0, 0});
+    };
+  };
+  const auto joints = [](std::vector<double> values, std::vector<std::string> names) {
+    return [=](demonstration::SkillQuery& q) {
+      q.joint_start = Eigen::Map<const Eigen::VectorXd>(values.data(),
+                                                        static_cast<Eigen::Index>(values.size()));
+      q.joint_start_names = names;
+    };
+  };
+  const std::vector<Case> cases = {
+      {position(kNan, 0, 0), "query.objects[0].pose.position", "not finite"},
+      {position(0, kInfinite, 0), "query.objects[0].pose.position", "not finite"},
+      {position(0, 0, -kInfinite), "query.objects[0].pose.position", "not finite"},
+      {position(1e300, 0, 0), "query.objects[0].position", "1e+300"},
+      {position(0, -20000, 0), "query.objects[0].position", "-20000"},
+      {[](auto& q) { q.objects[0].base_T_object.rotation.coeffs().setZero(); },
+       "query.objects[0].pose.rotation", "zero"},
+      {[](auto& q) { q.objects[0].base_T_object.rotation.x() = std::nan(""); },
+       "query.objects[0].pose.rotation", "not finite"},
+      {[](auto& q) { q.objects[0].name.clear(); }, "query.objects[0].name", "empty"},
+      {[](auto& q) { q.objects[0].name = std::string(100'000, 'x'); }, "query.objects[0].name",
+       "knows no object"},
+      {[](auto& q) { q.objects.push_back(q.objects[0]); }, "query.objects[1].name", "given twice"},
+      {[](auto& q) { q.objects.clear(); }, "query.objects", "lacks object \"button\""},
+      {start(kNan), "query.start.position", "not finite"},
+      {start(-1e30), "query.start", "-1e+30"},
+      {[](auto& q) {
+         q.start = geometry::Pose();
+         q.start->rotation.coeffs().setZero();
+       },
+       "query.start.rotation", "zero"},
+      {joints({kNan}, {}), "query.joint_start", "not finite"},
+      {joints({1, 2}, {"elbow"}), "query.joint_start", "2 values for 1 names"},
+  };
+  for (const Case& each : cases) {
+    demonstration::SkillQuery query = At(kPlaces[0]);
+    each.spoil(query);
+    const auto answer = skills().Query("press", 0, query);
+    ASSERT_FALSE(answer.ok()) << each.field << " " << each.words;
+    EXPECT_EQ(answer.error().field, each.field) << answer.error().message;
+    EXPECT_THAT(answer.error().message, HasSubstr(each.words));
+    // A stream says the same, and goes on.
+    const auto stream = rpc::OpenMotionStream({.server = service_->server->address()}, "press", 0);
+    ASSERT_TRUE(stream.ok());
+    EXPECT_EQ((*stream)->Ask(query).error().field, each.field);
+    EXPECT_TRUE((*stream)->Ask(At(kPlaces[0])).ok());
+  }
+  demonstration::SkillQuery unused = At(kPlaces[0]);
+  joints({1, 2}, {})(unused);
+  const auto warned = skills().Query("press", 0, unused);
+  ASSERT_TRUE(warned.ok()) << warned.error().message;
+  EXPECT_THAT(warned->warnings, Contains(HasSubstr("joint_start is not used")));
+  ExpectAllTrialsKept("press", kPlaces.size());
+}
+
 TEST_F(BadInputTest, EveryOptionOutOfRangeIsNamedWithItsValue) {
   SubmitAllAndLearn();
-  const std::vector<std::pair<std::string, std::string>> wrong = {{"method", "best"},
-                                                                  {"selection", "both"},
-                                                                  {"rule", "loose"},
-                                                                  {"force_rate", "fast"},
-                                                                  {"target", "lever"},
-                                                                  {"sample_rate_hz", "0"},
-                                                                  {"sample_rate_hz", "1e9"},
-                                                                  {"sample_rate_hz", "nan"},
-                                                                  {"cutoff_hz", "-1"},
-                                                                  {"cutoff_hz", "59"},
-                                                                  {"frames", "1"},
-                                                                  {"frames", "-7"},
-                                                                  {"frames", "1000000000000"},
-                                                                  {"leave_out", "nobody.csv"}};
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"method", "best"},      {"selection", "both"},       {"rule", "loose"},
+      {"force_rate", "fast"},  {"joints", "spied"},         {"alignment", "loose"},
+      {"threshold", "global"}, {"cues", "sound"},           {"target", "lever"},
+      {"sample_rate_hz", "0"}, {"sample_rate_hz", "1e9"},   {"sample_rate_hz", "nan"},
+      {"cutoff_hz", "-1"},     {"cutoff_hz", "59"},         {"frames", "1"},
+      {"frames", "-7"},        {"frames", "1000000000000"}, {"leave_out", "nobody.csv"}};
   std::set<std::string> tried;
   for (const auto& [name, value] : wrong) {
     const auto report = skills().Learn("press", {{name, value}}, {}, {});

@@ -189,6 +189,19 @@ TEST_F(LearningServiceTest, CancelledLearningChangesNothing) {
   EXPECT_TRUE(skills().Learn("press", {}, {}, {}).ok());
 }
 
+TEST_F(LearningServiceTest, SuggestsWhereToDemonstrateNextAndNamesWhatIsWrong) {
+  SubmitAllAndLearn();
+  const auto found = skills().Suggest("press", 0, {.count = 2});
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  ASSERT_FALSE(found->places.empty());
+  EXPECT_LE(found->places.size(), 2u);
+  EXPECT_EQ(found->places[0].target.name, "button");
+  EXPECT_GT(found->places[0].nearest_trial_m, 0);
+  EXPECT_FALSE(found->places[0].reason.empty());
+  EXPECT_EQ(skills().Suggest("press", 0, {.count = 21}).error().field, "count");
+  EXPECT_EQ(skills().Suggest("pres", 0, {}).error().code, ErrorCode::kNotFound);
+}
+
 TEST_F(LearningServiceTest, RollbackMakesAnOlderVersionTheCurrentOne) {
   SubmitAllAndLearn();
   ASSERT_TRUE(skills().Learn("press", {{"leave_out", "trial0.csv"}}, {}, {}).ok());
@@ -207,6 +220,79 @@ TEST_F(LearningServiceTest, RollbackMakesAnOlderVersionTheCurrentOne) {
   EXPECT_TRUE(versions->back().current);
   EXPECT_EQ(versions->back().version, 3);
   EXPECT_EQ(versions->front().trial_ids, ids_);
+}
+
+TEST_F(LearningServiceTest, AnOlderVersionIsReadFromTheStoreOnce) {
+  SubmitAllAndLearn();
+  ASSERT_TRUE(skills().Learn("press", {{"leave_out", "trial0.csv"}}, {}, {}).ok());
+  const auto first = skills().Query("press", 1, At({0.5, 0}));
+  ASSERT_TRUE(first.ok()) << first.error().message;
+  EXPECT_EQ(first->version, 1);
+  // Gone from the store behind the service's back: only memory can answer now.
+  ASSERT_TRUE(*service_->store->DeleteSkill("press"));
+  const auto again = skills().Query("press", 1, At({0.5, 0}));
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(Path(*again), Path(*first));
+}
+
+TEST_F(LearningServiceTest, ADeletedSkillIsForgottenAndLearnedAnewUnderTheNextNumber) {
+  SubmitAllAndLearn();
+  ASSERT_TRUE(skills().Learn("press", {}, {}, {}).ok());
+  ASSERT_TRUE(skills().Query("press", 1, At({0.5, 0})).ok());
+  ASSERT_TRUE(skills().Delete("press").ok());
+  for (const int version : {0, 1, 2}) {
+    EXPECT_EQ(skills().Query("press", version, At({0.5, 0})).error().code, ErrorCode::kNotFound);
+  }
+  const auto anew = skills().Learn("press", {}, {}, {});
+  ASSERT_TRUE(anew.ok()) << anew.error().message;
+  EXPECT_EQ(anew->version, 3);
+  EXPECT_EQ(skills().Versions("press")->size(), 1u);
+  EXPECT_EQ(skills().Query("press", 1, At({0.5, 0})).error().field, "skill.version");
+}
+
+TEST_F(LearningServiceTest, SkillsStoredWithNumbersAsArraysAreStillRead) {
+  SubmitAllAndLearn();
+  const auto before = skills().Query("press", 0, At({0.51, 0.03}));
+  ASSERT_TRUE(before.ok());
+  // Version 2: the same, written as the first programs wrote it.
+  const auto kept = learning::SkillFromBytes(**service_->store->Document("press", 1));
+  ASSERT_TRUE(kept.ok()) << kept.error().message;
+  StoredVersion old;
+  old.skill = "press";
+  old.info = service_->store->ListVersions("press")->at(0);
+  old.info.version = 2;
+  nlohmann::json::to_cbor(learning::ToJson(kept->Named("press", 2)), old.document);
+  EXPECT_NE(old.document, **service_->store->Document("press", 1));
+  ASSERT_TRUE(service_->store->AddVersion(old).ok());
+  service_.reset();
+  service_ = std::make_unique<Service>(folder_);
+  const auto after = skills().Query("press", 0, At({0.51, 0.03}));
+  ASSERT_TRUE(after.ok()) << after.error().message;
+  EXPECT_EQ(after->version, 2);
+  EXPECT_EQ(Path(*after), Path(*before));
+}
+
+TEST_F(LearningServiceTest, TwoPressesAreTwoContactsInTheAnswer) {
+  for (std::size_t i = 0; i < kPlaces.size(); ++i) {
+    const std::string file = PressTrial(kPlaces[i], i, 2);
+    ASSERT_TRUE(trials().Submit("twice", "trial" + std::to_string(i) + ".csv", file).ok());
+  }
+  const auto report = skills().Learn("twice", {}, {}, {});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  const Place place{0.55, -0.10};
+  const auto motion = skills().Query("twice", 0, At(place));
+  ASSERT_TRUE(motion.ok()) << motion.error().message;
+  ASSERT_EQ(motion->contacts.size(), 2u);
+  EXPECT_LT(motion->contacts[0].last, motion->contacts[1].first);
+  const Eigen::MatrixXd path = Path(*motion);
+  const Eigen::RowVector3d button(place.x, place.y, 0.05);
+  for (const demonstration::Contact& contact : motion->contacts) {
+    EXPECT_TRUE(contact.touch_measured);
+    EXPECT_LT((path.row(contact.first) - button).norm(), 2e-3);
+  }
+  // Between them the finger leaves the button.
+  const int between = (motion->contacts[0].last + motion->contacts[1].first) / 2;
+  EXPECT_GT(path(between, 2), 0.05 + 0.03);
 }
 
 TEST_F(LearningServiceTest, DeletingASkillKeepsItsTrials) {

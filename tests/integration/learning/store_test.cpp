@@ -63,6 +63,75 @@ TEST_F(StoreTest, NumbersVersionsOnwardAfterARollback) {
   EXPECT_FALSE(store->Document("press", 2)->has_value());
 }
 
+TEST_F(StoreTest, NumbersVersionsOnwardAfterTheSkillWasDeleted) {
+  const auto add = [](Store& store, int version) {
+    StoredVersion stored;
+    stored.skill = "press";
+    stored.info.version = version;
+    return store.AddVersion(stored).ok();
+  };
+  {
+    const auto store = Open();
+    ASSERT_TRUE(add(*store, 1) && add(*store, 2));
+    ASSERT_TRUE(*store->DeleteSkill("press"));
+    EXPECT_EQ(*store->NextVersion("press"), 3);
+    EXPECT_EQ(*store->NextVersion("push"), 1);
+  }
+  const auto store = Open();
+  EXPECT_EQ(*store->NextVersion("press"), 3);
+  ASSERT_TRUE(add(*store, 3));
+  EXPECT_EQ(store->ListSkills()->at(0).versions, 1);
+  EXPECT_EQ(*store->NextVersion("press"), 4);
+}
+
+/// As the first schema had it.
+constexpr const char* kFirstSchema = R"sql(
+CREATE TABLE trials (number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE,
+  skill TEXT NOT NULL, source TEXT NOT NULL, submitted_ns INTEGER NOT NULL, info TEXT NOT NULL,
+  file BLOB NOT NULL) STRICT;
+CREATE INDEX trials_by_skill ON trials (skill, number);
+CREATE TABLE skills (name TEXT PRIMARY KEY, current INTEGER NOT NULL, last INTEGER NOT NULL) STRICT;
+CREATE TABLE versions (skill TEXT NOT NULL REFERENCES skills (name) ON DELETE CASCADE,
+  version INTEGER NOT NULL, method TEXT NOT NULL, target TEXT NOT NULL, learned_ns INTEGER NOT NULL,
+  options TEXT NOT NULL, trial_ids TEXT NOT NULL, document BLOB NOT NULL,
+  PRIMARY KEY (skill, version)) STRICT;
+PRAGMA application_id = 1165520240; PRAGMA user_version = 1;
+)sql";
+
+TEST_F(StoreTest, BringsAStoreOfTheFirstSchemaUpToDateAndKeepsAllOfIt) {
+  std::filesystem::create_directories(folder_);
+  {
+    const auto database = Database::Open(folder_ / "learning.db");
+    ASSERT_TRUE((*database)->Execute(kFirstSchema).ok());
+    const std::string file = Compress("time_s\n0\n");
+    ASSERT_TRUE((*database)
+                    ->Prepare("INSERT INTO trials (id, skill, source, submitted_ns, info, file)"
+                              " VALUES ('trial-1', 'press', 'a.csv', 5, '{}', ?)")
+                    .BindBlob(file)
+                    .Run());
+    ASSERT_TRUE((*database)->Execute("INSERT INTO skills VALUES ('press', 2, 7)").ok());
+    for (const std::int64_t version : {1, 2}) {
+      const std::string document = Compress("document " + std::to_string(version));
+      ASSERT_TRUE((*database)
+                      ->Prepare("INSERT INTO versions VALUES ('press', ?, 'frames', 'button', 9,"
+                                " '{}', '[\"trial-1\"]', ?)")
+                      .Bind(version)
+                      .BindBlob(document)
+                      .Run());
+    }
+  }
+  for (int time = 0; time < 2; ++time) {
+    const auto store = Open();
+    ASSERT_NE(store, nullptr);
+    EXPECT_EQ(*store->TrialFile("trial-1"), "time_s\n0\n");
+    EXPECT_EQ(**store->Document("press", 1), "document 1");
+    EXPECT_EQ(**store->Document("press", 2), "document 2");
+    EXPECT_EQ(store->ListSkills()->at(0).version, 2);
+    EXPECT_EQ(store->ListVersions("press")->at(1).trial_ids, std::vector<std::string>{"trial-1"});
+    EXPECT_EQ(*store->NextVersion("press"), 8);
+  }
+}
+
 TEST_F(StoreTest, IsOpenInOneProcessOnly) {
   const auto store = Open();
   const auto second = Store::Open(folder_);
