@@ -92,15 +92,15 @@ def counted(info):
 
 
 def load(bench, rounds):
-    bare_cores, recorder_cores, missing, lost, sent_total = [], [], 0, 0, 0
+    bare_us, recorder_us, missing, lost, sent_total = [], [], 0, 0, 0
     for number in range(rounds):
         said, cpu, received = bench.drained()
-        bare_cores.append(cpu / said["seconds"])
+        bare_us.append(1e6 * cpu / received["received"])
         print(f"bare reader: {cpu:.2f} CPU s of {said['seconds']:.1f} s, {received}, publisher at most "
               f"{said['latest_ms']:.1f} ms late", file=sys.stderr)
         said, cpu, status, info = bench.recorded(f"load-{number}")
-        recorder_cores.append(cpu / said["seconds"])
         counts = counted(info)
+        recorder_us.append(1e6 * cpu / sum(counts.values()))
         sent = {topic: count for topic, count in said["sent"].items() if topic != "refused"}
         absent = {topic: count - counts.get(topic, 0) for topic, count in sent.items()}
         of_round = sum(loss["lost_in_gaps"] + loss["lost_at_end"] + loss["dropped_by_recorder"] for loss in info["losses"])
@@ -110,9 +110,9 @@ def load(bench, rounds):
         missing += sum(absent.values()) + said["sent"]["refused"]
         lost += of_round
         sent_total += sum(sent.values())
-    recorder, bare = statistics.median(recorder_cores), statistics.median(bare_cores)
+    recorder, bare = statistics.median(recorder_us), statistics.median(bare_us)
     return [
-        {"name": "recorder_cpu", "value": recorder, "unit": "cores", "peer": "raw reader that throws samples away",
+        {"name": "recorder_cpu", "value": recorder, "unit": "us/sample", "peer": "raw reader that throws samples away",
          "peer_value": bare, "ratio": recorder / bare},
         {"name": "recorder_missing", "value": missing, "unit": "samples", "peer": "sent by the load's writers",
          "peer_value": sent_total, "ratio": missing / sent_total},

@@ -1,9 +1,11 @@
 """A real recorder: killed at random moments, told of events, split, its files labelled."""
 
 import calendar
+import json
 import pathlib
 import random
 import shutil
+import subprocess
 import tempfile
 import time
 import unittest
@@ -54,6 +56,8 @@ class RecorderTest(unittest.TestCase):
             info = exemplar("record", "info", self.folder / f"{name}.whole.mcap")
             end = exemplar_time(info["start"]) + info["duration_s"]
             self.assertGreater(end, killed - OLDEST_LOST_S, self.programs.logs())
+            numbers = [number for number, *_ in messages(self.folder / f"{name}.whole.mcap")[TOPIC]]
+            self.assertEqual(numbers, list(range(numbers[0], numbers[0] + len(numbers))), "none is missing before the end")
 
     def test_a_full_disk_stops_the_recording_with_what_is_written_intact(self):
         data = self.folder / "data"
@@ -93,6 +97,41 @@ class RecorderTest(unittest.TestCase):
         self.assertEqual(info["metadata"]["exemplar.labels"], {"success": "yes"})
         self.assertEqual(info["metadata"]["exemplar.event"]["note"], "stuck")
         self.assertEqual(file.read_bytes()[: len(before) // 2], before[: len(before) // 2])
+        submitted = self.submit(file)
+        self.assertIn("label success: yes", submitted["notices"])
+        self.assertNotIn("label phase: press", submitted["notices"])
+
+    def submit(self, file):
+        """The trial that the learning service makes of a recording, as it shows it."""
+        port_file = self.folder / "learning-port"
+        words = ("--listen", "127.0.0.1:0", "--port-file", port_file, "--data-dir", self.folder / "learned")
+        self.programs.start("exemplar-learning", *words, bus=False)
+        wait_for(lambda: port_file.exists() and port_file.read_text().strip(), "the learning service's port")
+        server = ("--server", "127.0.0.1:" + port_file.read_text().strip().rsplit(":", 1)[-1])
+        exemplar("trial", "submit", "--skill", "press", file, *server)
+        (trial,) = exemplar("trial", "list", *server)
+        return trial
+
+    def test_a_replay_is_recorded_as_the_original_was(self):
+        _, server = self.programs.recorder()
+        capture = self.replay("--rate", "2")
+        exemplar("record", "start", "--name", "original", "--topic", TOPIC, "--server", server)
+        capture.wait(30)
+        exemplar("record", "stop", "--server", server)
+        original = self.folder / "data" / "original.mcap"
+        exemplar("record", "start", "--name", "again", "--server", server)
+        played = exemplar("record", "replay", original, "--rate", "4", "--domain", "93", "--station", "test")
+        exemplar("record", "stop", "--server", server)
+        self.assertEqual(played["refused"], 0)
+        left_out = {topic["topic"] for topic in played["topics"] if topic["left_out"]}
+        self.assertEqual(left_out, {name for name in left_out if name.endswith(("/status", "/command", "/clock"))})
+        before, after = messages(original), messages(self.folder / "data" / "again.mcap")
+        self.assertEqual(len(before[TOPIC]), self.samples)
+        for topic, sent in before.items():
+            if topic not in left_out:
+                self.assertEqual([said[1:] for said in after[topic]], [said[1:] for said in sent], topic)
+        losses = exemplar("record", "info", self.folder / "data" / "again.mcap")["losses"]
+        self.assertEqual(sum(loss["lost_in_gaps"] + loss["lost_at_end"] for loss in losses), 0)
 
     def test_a_split_recording_has_every_sample_once(self):
         _, server = self.programs.recorder()
@@ -107,6 +146,20 @@ class RecorderTest(unittest.TestCase):
         self.assertEqual(sum(info["messages"] for info in infos), stopped["messages"])
         for before, info in zip(files, infos[1:]):
             self.assertEqual(info["metadata"]["exemplar.recording"]["previous_file"], before.name)
+
+
+def messages(file):
+    """Number, source time and bytes of each topic's messages, in order, as the conformance program reads them."""
+    read = subprocess.run([processes.BINARIES / "mcap_conformance", "read", file], check=True, stdout=subprocess.PIPE)
+    channels, by_topic = {}, {}
+    for record in json.loads(read.stdout)["records"]:
+        fields = dict(record["fields"])
+        if record["type"] == "Channel":
+            channels[fields["id"]] = fields["topic"]
+        elif record["type"] == "Message":
+            by_topic.setdefault(channels[fields["channel_id"]], []).append(
+                (int(fields["sequence"]), fields["publish_time"], fields["data"]))
+    return by_topic
 
 
 def exemplar_time(text):

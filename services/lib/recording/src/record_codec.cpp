@@ -495,4 +495,8 @@ std::uint32_t Crc32(std::uint32_t crc, ByteView bytes) {
   return static_cast<std::uint32_t>(crc32_z(crc, bytes.data(), bytes.size()));
 }
 
+std::uint32_t JoinCrc32(std::uint32_t crc, std::uint32_t of_next, std::uint64_t next_size) {
+  return static_cast<std::uint32_t>(crc32_combine(crc, of_next, static_cast<z_off_t>(next_size)));
+}
+
 }  // namespace exemplar::recording

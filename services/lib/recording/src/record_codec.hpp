@@ -63,5 +63,7 @@ Result<Chunk> DecodeCutChunk(ByteView content);
 
 /// CRC-32 (IEEE 802.3) of `bytes` behind what `crc` covers already; begin with 0.
 std::uint32_t Crc32(std::uint32_t crc, ByteView bytes);
+/// The CRC of what `crc` covers and then of `next_size` bytes whose own CRC is `of_next`.
+std::uint32_t JoinCrc32(std::uint32_t crc, std::uint32_t of_next, std::uint64_t next_size);
 
 }  // namespace exemplar::recording

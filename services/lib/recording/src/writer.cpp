@@ -165,13 +165,26 @@ class McapWriter final : public Writer {
     return {};
   }
 
-  Status Put(ByteView bytes) {
+  /// A part of what is written whose CRC is known already.
+  struct KnownPart {
+    std::size_t offset = 0;
+    std::size_t size = 0;
+    std::uint32_t crc = 0;
+  };
+
+  Status Put(ByteView bytes) { return Put(bytes, KnownPart()); }
+
+  Status Put(ByteView bytes, const KnownPart& known) {
     Status written = sink_.Write(bytes);
     if (!written.ok()) {
       failed_ = written.error();
       return written;
     }
-    if (options_.data_crc && !data_ended_) data_crc_ = Crc32(data_crc_, bytes);
+    if (options_.data_crc && !data_ended_) {
+      data_crc_ = Crc32(data_crc_, bytes.first(known.offset));
+      data_crc_ = JoinCrc32(data_crc_, known.crc, known.size);
+      data_crc_ = Crc32(data_crc_, bytes.subspan(known.offset + known.size));
+    }
     bytes_written_ += bytes.size();
     return {};
   }
@@ -239,6 +252,10 @@ class McapWriter final : public Writer {
     scratch_.clear();
     scratch_.reserve(kRecordPrefix + kChunkPrefix + 8 + records.size());
     EncodeChunkPrefix(chunk, records.size(), scratch_);
+    KnownPart known;
+    if (options_.compression == Compression::kNone && options_.chunk_crc) {
+      known = {scratch_.size(), records.size(), chunk.uncompressed_crc};
+    }
     scratch_.insert(scratch_.end(), records.begin(), records.end());
     ChunkIndex index;
     index.message_start_time = chunk.message_start_time;
@@ -256,7 +273,7 @@ class McapWriter final : public Writer {
       message_index.entries.clear();
     }
     index.message_index_length = scratch_.size() - index.chunk_length;
-    if (const Status put = Put(scratch_); !put.ok()) return put;
+    if (const Status put = Put(scratch_, known); !put.ok()) return put;
     if (options_.chunk_indexes) {
       Encode(index, chunk_index_records_);
       if (chunk_index_records_.size() >= kBlock) {
