@@ -76,7 +76,8 @@ struct Output {
 };
 
 // Four rows from `at`; false where an angle is too far, or no number.
-EXEMPLAR_INLINE bool WalkFour(const std::vector<Segment>& links, Eigen::Index at, const Output& to) {
+EXEMPLAR_INLINE bool WalkFour(const std::vector<Segment>& links, Eigen::Index at,
+                              const Output& to) {
   FourQuaternions q;
   Spread(Eigen::Quaterniond::Identity(), q);
   Point p = {};

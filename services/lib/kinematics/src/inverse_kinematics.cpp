@@ -24,7 +24,7 @@ constexpr double kLargestStep = 1.0;  // rad or m, of one joint
 /// A descent that has not halved its squared error in so many iterations starts elsewhere.
 constexpr int kPatience = 8;
 constexpr double kNullSpaceStep = 0.5;
-constexpr int kNullSpaceIterations = 60;
+constexpr double kNearestPlace_m = 1e-6;
 
 /// Task error and Jacobian at one posture.
 struct Evaluation {
@@ -52,14 +52,16 @@ class Solver {
       e->jacobian.resize(6, n_);
       e->untasked.setZero();
     }
+    slack_ = options.position_slack_m.maxCoeff() > 0 || options.rotation_slack_rad.maxCoeff() > 0;
+    costs_ = !options.posture.empty();
     lower_.resize(n_);
     upper_.resize(n_);
     for (int i = 0; i < n_; ++i) {
       lower_[i] = chain.limits()[i].lower;
       upper_[i] = chain.limits()[i].upper;
     }
-    ease_ = Eigen::VectorXd::Ones(n_);
-    if (options.preferred_weights.size() == n_) ease_ = options.preferred_weights.cwiseInverse();
+    weights_ = Eigen::VectorXd::Ones(n_);
+    if (options.preferred_weights.size() == n_) weights_ = options.preferred_weights;
   }
 
   Result<IkSolution> Solve(const Eigen::Ref<const Eigen::VectorXd>& seed) {
@@ -75,7 +77,7 @@ class Solver {
       if (attempt == options_.max_restarts) return NotMet();
       RandomPosture(rng);
     }
-    if (options_.preferred.size() == n_) ApproachPreferred(solution.iterations);
+    if (options_.preferred.size() == n_ || costs_) Improve(solution.iterations);
     solution.q = best_.q;
     solution.position_error_m = best_.position;
     solution.rotation_error_rad = best_.rotation;
@@ -86,8 +88,9 @@ class Solver {
   void Evaluate(Evaluation& e) const {
     const geometry::Pose pose = chain_.ToolPoseAndJacobian(e.q, e.jacobian);
     e.error.head<3>() = goal_.translation - pose.translation;
-    e.position = e.error.head<3>().norm();
-    if (!options_.use_rotation) {
+    if (options_.point_at) {
+      PointAt(pose, e);
+    } else if (!options_.use_rotation) {
       e.error.tail<3>().setZero();
       e.jacobian.bottomRows<3>().setZero();
       e.untasked.bottomRightCorner<3, 3>().setIdentity();
@@ -103,8 +106,64 @@ class Solver {
     } else {
       e.error.tail<3>() = geometry::LogSo3(goal_.rotation * pose.rotation.conjugate());
     }
+    if (slack_) TakeOffSlack(e);
+    e.position = e.error.head<3>().norm();
     e.rotation = e.error.tail<3>().norm();
     e.squared = e.error.squaredNorm();
+  }
+
+  /// The turn from the tool's z axis to the direction of the place. That direction changes as the
+  /// tool moves: for a velocity v, by -u x v / distance.
+  void PointAt(const geometry::Pose& pose, Evaluation& e) const {
+    const Eigen::Vector3d way = *options_.point_at - pose.translation;
+    const double distance = std::max(way.norm(), kNearestPlace_m);
+    const Eigen::Vector3d u = way / distance;
+    const Eigen::Vector3d z = pose.rotation * Eigen::Vector3d::UnitZ();
+    e.error.tail<3>() = geometry::LogSo3(Eigen::Quaterniond::FromTwoVectors(z, u));
+    for (int i = 0; i < n_; ++i) {
+      const Eigen::Vector3d v = e.jacobian.col(i).head<3>();
+      const Eigen::Vector3d turn = e.jacobian.col(i).tail<3>();
+      e.jacobian.col(i).tail<3>() = turn - z.dot(turn) * z + u.cross(v) / distance;
+    }
+    e.untasked.bottomRightCorner<3, 3>().noalias() = z * z.transpose();
+  }
+
+  /// Turns error and Jacobian into the goal's frame and leaves of each component what is beyond its
+  /// slack; components within it are no task.
+  void TakeOffSlack(Evaluation& e) const {
+    const Eigen::Matrix3d goal_R_base = goal_.rotation.toRotationMatrix().transpose();
+    e.error.head<3>() = goal_R_base * e.error.head<3>();
+    e.jacobian.topRows<3>() = (goal_R_base * e.jacobian.topRows<3>()).eval();
+    const bool turns = options_.use_rotation && !options_.free_tool_roll && !options_.point_at;
+    e.untasked.topLeftCorner<3, 3>().setZero();
+    if (turns) {
+      const Eigen::Vector3d turn = goal_R_base * e.error.tail<3>();
+      // A small turn w changes the rotation vector r by the inverse of the right Jacobian of SO(3)
+      // at r (Chirikjian 2011), which far from r = 0 is not the identity.
+      const double angle = turn.norm();
+      Eigen::Matrix3d cross;
+      cross << 0, -turn.z(), turn.y(), turn.z(), 0, -turn.x(), -turn.y(), turn.x(), 0;
+      Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity() + 0.5 * cross;
+      if (angle > 1e-4) {
+        const double part = 1 / (angle * angle) -
+                            (1 + std::cos(angle)) / (2 * angle * std::max(std::sin(angle), 1e-9));
+        inverse += part * cross * cross;
+      } else {
+        inverse += cross * cross / 12;
+      }
+      e.error.tail<3>() = turn;
+      e.jacobian.bottomRows<3>() = (inverse * goal_R_base * e.jacobian.bottomRows<3>()).eval();
+      e.untasked.bottomRightCorner<3, 3>().setZero();
+    }
+    for (int row = 0; row < (turns ? 6 : 3); ++row) {
+      const double slack =
+          row < 3 ? options_.position_slack_m[row] : options_.rotation_slack_rad[row - 3];
+      double& error = e.error[row];
+      error = std::copysign(std::max(0.0, std::abs(error) - slack), error);
+      if (error != 0 || slack == 0) continue;
+      e.jacobian.row(row).setZero();
+      e.untasked(row, row) = 1;
+    }
   }
 
   bool Met(const Evaluation& e) const {
@@ -214,34 +273,49 @@ class Solver {
     return Met(now_);
   }
 
-  double Cost(const Eigen::VectorXd& away) const {
-    return (away.array().square() / ease_.array()).sum();
+  /// What `preferred` and the other costs say of q. pull_ becomes the step to their minimum where
+  /// nothing holds, ease_ the inverse of their curvature.
+  double Cost(const Eigen::VectorXd& q) {
+    double cost = 0;
+    Eigen::VectorXd slope = Eigen::VectorXd::Zero(n_);
+    Eigen::VectorXd curvature = Eigen::VectorXd::Zero(n_);
+    if (costs_) {
+      cost = EvaluatePostureCost(chain_, options_.posture, q, slope, curvature);
+    }
+    if (options_.preferred.size() == n_) {
+      const Eigen::VectorXd away = q - options_.preferred;
+      cost += 0.5 * away.dot(weights_.cwiseProduct(away));
+      slope += weights_.cwiseProduct(away);
+      curvature += weights_;
+    }
+    ease_ = curvature.cwiseInverse();
+    pull_ = -ease_.cwiseProduct(slope);
+    return cost;
   }
 
-  /// Moves best_, which meets the pose, along the null space to the least weighted distance to
-  /// `preferred`: Newton's steps for the tangent problem, each brought back onto the pose.
-  void ApproachPreferred(int& iterations) {
-    const Eigen::VectorXd& goal = options_.preferred;
+  /// Moves best_, which meets the pose, along the null space to the least cost: Newton's steps for
+  /// the tangent problem, with the diagonal of the Hessian, each brought back onto the pose.
+  void Improve(int& iterations) {
     double longest = kNullSpaceStep;
-    double distance = Cost(best_.q - goal);
-    for (int i = 0; i < kNullSpaceIterations && longest > 1e-5; ++i) {
+    double cost = Cost(best_.q);
+    for (int i = 0; i < options_.max_null_space_iterations && longest > 1e-5; ++i) {
       ++iterations;
-      const Eigen::VectorXd pull = goal - best_.q;
-      BoundedStep(best_, &pull, kSmallestDamping);
+      BoundedStep(best_, &pull_, kSmallestDamping);
       const double largest = step_.cwiseAbs().maxCoeff();
       if (largest < 1e-7) return;
       TakeStep(best_, std::min(1.0, longest / largest), now_);
       if (Restore(iterations)) {
-        const double reached = Cost(now_.q - goal);
-        if (reached < distance) {
-          const bool settled = distance - reached < 1e-13;
-          distance = reached;
+        const double reached = Cost(now_.q);
+        if (reached < cost) {
+          const bool settled = cost - reached < 5e-14;
+          cost = reached;
           std::swap(best_, now_);
           if (settled) return;
           longest = std::min(kNullSpaceStep, 2 * longest);
           continue;
         }
       }
+      (void)Cost(best_.q);
       longest = 0.5 * std::min(longest, largest);
     }
   }
@@ -268,7 +342,10 @@ class Solver {
   const IkOptions& options_;
   const int n_;
   Eigen::VectorXd lower_, upper_, step_;
-  Eigen::VectorXd ease_;  ///< inverse weights
+  Eigen::VectorXd weights_;      ///< of `preferred`
+  Eigen::VectorXd ease_, pull_;  ///< see Cost
+  bool slack_ = false;
+  bool costs_ = false;
   Eigen::Array<bool, Eigen::Dynamic, 1> fixed_;
   Evaluation now_, next_, best_;
 };
@@ -284,6 +361,13 @@ Result<IkSolution> SolveIk(const Chain& chain, const geometry::Pose& base_T_tool
     return InvalidArgument("the wanted pose of \"" + chain.tip_link() +
                                "\" is not finite or its quaternion is not of unit length",
                            "base_T_tool");
+  }
+  const auto is_slack = [](const Eigen::Vector3d& slack) { return (slack.array() >= 0).all(); };
+  if (!is_slack(options.position_slack_m) || !is_slack(options.rotation_slack_rad)) {
+    return InvalidArgument("a slack is negative or no number", "slack");
+  }
+  if (options.point_at && !options.point_at->allFinite()) {
+    return InvalidArgument("the place to point at is not finite", "point_at");
   }
   if (!seed.allFinite()) return InvalidArgument("the seed posture is not finite", "seed");
   const geometry::Pose goal = {base_T_tool.translation, base_T_tool.rotation.normalized()};
