@@ -5,11 +5,10 @@
 #include <numeric>
 
 #include "approach.hpp"
-#include "branches.hpp"
+#include "avoid.hpp"
 #include "describe.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
-#include "path_ik.hpp"
 #include "timing.hpp"
 #include "trajectory.hpp"
 
@@ -25,7 +24,9 @@ constexpr double kComfortableShare = 0.6;
 constexpr double kSameStart_m = 0.02;
 constexpr double kSameStart_rad = 0.25;
 constexpr double kRoughSmoothness = 1e-4;
-constexpr double kLargeJointStep_rad = 0.2;
+/// Beyond the clearance asked for, where joints turn away from obstacles.
+constexpr double kAvoidingMargin_m = 0.02;
+constexpr int kAvoidingRounds = 6;
 
 std::string FrameAt(const SkillMotion& motion, int frame) {
   return "frame " + std::to_string(frame) + " of " + std::to_string(motion.frames()) + " (" +
@@ -181,6 +182,10 @@ Result<Prepared> Prepare(const SkillMotion& motion, const kinematics::Chain& cha
   for (const demonstration::Contact& contact : motion.contacts) {
     for (int k = contact.first; k <= contact.last; ++k) path.exact[k] = true;
   }
+  path.contact.position_tolerance_m = options.position_tolerance_m;
+  path.contact.rotation_tolerance_rad = options.rotation_tolerance_rad;
+  path.free.position_tolerance_m = options.free_tolerance_m;
+  path.free.rotation_tolerance_rad = options.rotation_tolerance_rad;
   const geometry::Pose now = chain.ToolPose(start);
   const geometry::Pose& first = path.base_T_tool.front();
   if ((now.translation - first.translation).norm() < kSameStart_m &&
@@ -191,22 +196,56 @@ Result<Prepared> Prepare(const SkillMotion& motion, const kinematics::Chain& cha
   return out;
 }
 
+/// Refuses joints outside their limits, and steps so large that the tool leaves its path between
+/// two frames: changes of posture.
+Status VerifyBetween(const SkillMotion& motion, const kinematics::Chain& chain,
+                     const PathProblem& path, const PathSolution& solution,
+                     const PlanOptions& options) {
+  for (int k = 0; k < motion.frames(); ++k) {
+    for (int j = 0; j < chain.dof(); ++j) {
+      const kinematics::JointLimits& limits = chain.limits()[j];
+      const double q = solution.joints(k, j);
+      if (q >= limits.lower && q <= limits.upper) continue;
+      return FailedPrecondition("the robot cannot follow the motion: " + FrameAt(motion, k) +
+                                    ": joint \"" + chain.joint_names()[j] + "\" would stand at " +
+                                    FormatFixed(q, 3) + ", outside its limits " +
+                                    FormatFixed(limits.lower, 3) + " to " +
+                                    FormatFixed(limits.upper, 3),
+                                "motion.base_T_tool");
+    }
+  }
+  for (const int k : solution.large_steps) {
+    const Eigen::VectorXd middle =
+        0.5 * (solution.joints.row(k - 1) + solution.joints.row(k)).transpose();
+    const geometry::Pose asked =
+        geometry::Interpolate(path.base_T_tool[k - 1], path.base_T_tool[k], 0.5);
+    const double off = (chain.ToolPose(middle).translation - asked.translation).norm();
+    if (off <= 2 * options.free_tolerance_m) continue;
+    int joint = 0;
+    const double step =
+        (solution.joints.row(k) - solution.joints.row(k - 1)).cwiseAbs().maxCoeff(&joint);
+    return FailedPrecondition("the robot cannot follow the motion: before " + FrameAt(motion, k) +
+                                  " joint \"" + chain.joint_names()[joint] + "\" has to move " +
+                                  FormatFixed(step, 2) + " rad at once, and the tool leaves its " +
+                                  "path by " + FormatFixed(1000 * off, 1) + " mm",
+                              "motion.base_T_tool");
+  }
+  return {};
+}
+
 /// Errors of the joints against the tool path; refuses what is out of tolerance.
 Status VerifyPath(const SkillMotion& motion, const kinematics::Chain& chain,
-                  const Prepared& prepared, const Eigen::MatrixXd& joints,
+                  const Prepared& prepared, const PathSolution& solution,
                   const PlanOptions& options, PlanReport& report) {
   const PathProblem& path = prepared.path;
+  const Eigen::MatrixXd& joints = solution.joints;
   double worst_excess = 1;
   std::string worst;
   double style = 0;
   int style_terms = 0;
-  Eigen::VectorXd q(chain.dof());
   for (int k = 0; k < motion.frames(); ++k) {
-    q = joints.row(k).transpose();
-    const geometry::Pose at = chain.ToolPose(q);
-    const double position = (at.translation - path.base_T_tool[k].translation).norm();
-    const double rotation =
-        path.use_rotation ? geometry::AngleBetween(at.rotation, path.base_T_tool[k].rotation) : 0.0;
+    const double position = solution.position_error_m[k];
+    const double rotation = solution.rotation_error_rad[k];
     const bool exact = path.exact[k];
     double& position_report = exact ? report.max_contact_error_m : report.max_position_error_m;
     position_report = std::max(position_report, position);
@@ -241,7 +280,7 @@ Status VerifyPath(const SkillMotion& motion, const kinematics::Chain& chain,
   if (!worst.empty()) {
     return FailedPrecondition("the robot cannot follow the motion: " + worst, "motion.base_T_tool");
   }
-  return {};
+  return VerifyBetween(motion, chain, path, solution, options);
 }
 
 /// A stretch of a trajectory with its own permissions.
@@ -344,26 +383,43 @@ class Planner {
         options_(options),
         prepared_(prepared) {}
 
-  Result<PlannedMotion> From(const Branch& branch, std::stop_token stop) const {
-    PathSolution path = SolvePath(chain_, prepared_.path, branch.joints, stop);
-    PlannedMotion plan;
-    Status followed = VerifyPath(motion_, chain_, prepared_, path.joints, options_, plan.report);
-    if (!followed.ok()) {
+  Result<PlannedMotion> From(const Branch& branch, const std::stop_token& stop) const {
+    PathSolution path =
+        RefinePath(chain_, prepared_.path, branch, options_.inverse_kinematics, stop);
+    if (!path.missed.empty()) {
       // Perhaps only too quick to be followed smoothly; the timing slows it down afterwards.
       PathProblem rougher = prepared_.path;
       rougher.smoothness = kRoughSmoothness;
-      path = SolvePath(chain_, rougher, path.joints, stop);
-      plan.report = {};
-      followed = VerifyPath(motion_, chain_, prepared_, path.joints, options_, plan.report);
+      path = RefinePath(chain_, rougher, {path.joints, branch.cuts, 0, 0},
+                        options_.inverse_kinematics, stop);
     }
+    Result<PlannedMotion> plan = Along(path);
+    if (plan.ok() || !path.missed.empty()) return plan;
+    // Perhaps the joints can stay clear where the tool's path leaves them free.
+    const FrameTouches touches = TouchesByFrame();
+    for (int round = 0; round < kAvoidingRounds && !stop.stop_requested(); ++round) {
+      const std::optional<PathProblem> away =
+          AwayFromObstacles(model_, chain_, checker_, prepared_.path, path.joints, touches,
+                            options_.required_clearance_m + kAvoidingMargin_m);
+      if (!away) break;
+      path = RefinePath(chain_, *away, {path.joints, branch.cuts, 0, 0},
+                        options_.inverse_kinematics, stop);
+      Result<PlannedMotion> clear = Along(path);
+      if (clear.ok()) return clear;
+    }
+    return plan;
+  }
+
+  /// The plan that follows these joints, or why there is none.
+  Result<PlannedMotion> Along(const PathSolution& path) const {
+    PlannedMotion plan;
+    Status followed = VerifyPath(motion_, chain_, prepared_, path, options_, plan.report);
     if (!followed.ok()) return followed.error();
 
     std::vector<double> frame_time_s;
     const JointTrajectory skill = TimePath(prepared_.path.time_s, path.joints, chain_.joint_names(),
                                            chain_.limits(), options_.speed_scale, frame_time_s);
-    const std::vector<std::string> touch_links = options_.touch_links.empty()
-                                                     ? std::vector<std::string>{chain_.tip_link()}
-                                                     : options_.touch_links;
+    const std::vector<std::string> touch_links = TouchLinks();
     std::vector<collision::AllowedTouch> touches;
     for (const demonstration::Contact& contact : motion_.contacts) {
       for (const std::string& link : touch_links) touches.push_back({link, contact.object});
@@ -403,6 +459,30 @@ class Planner {
   }
 
  private:
+  std::vector<std::string> TouchLinks() const {
+    if (!options_.touch_links.empty()) return options_.touch_links;
+    return {chain_.tip_link()};
+  }
+
+  /// What may be touched at each frame of the skill's motion: near the contacts, along the path.
+  FrameTouches TouchesByFrame() const {
+    const std::vector<geometry::Pose>& path = prepared_.path.base_T_tool;
+    FrameTouches touches(path.size());
+    for (const demonstration::Contact& contact : motion_.contacts) {
+      const auto near = [&](int frame, int end) {
+        return (path[frame].translation - path[end].translation).norm() <= options_.touch_margin_m;
+      };
+      int first = contact.first;
+      while (first > 0 && near(first - 1, contact.first)) --first;
+      int last = contact.last;
+      while (last + 1 < motion_.frames() && near(last + 1, contact.last)) ++last;
+      for (int k = first; k <= last; ++k) {
+        for (const std::string& link : TouchLinks()) touches[k].push_back({link, contact.object});
+      }
+    }
+    return touches;
+  }
+
   const SkillMotion& motion_;
   const kinematics::RobotModel& model_;
   const kinematics::Chain& chain_;
@@ -411,6 +491,16 @@ class Planner {
   const PlanOptions& options_;
   const Prepared& prepared_;
 };
+
+Result<PathSolution> SolveByFrames(const kinematics::RobotModel& model,
+                                   const kinematics::Chain& chain, const PathProblem& path,
+                                   const Eigen::Ref<const Eigen::VectorXd>& start,
+                                   PathIkVariant variant) {
+  if (variant != PathIkVariant::kEnergy) return SolvePath(chain, path, start, variant);
+  const Result<kinematics::ChainInertia> inertia = kinematics::ChainInertia::Create(model, chain);
+  if (!inertia.ok()) return inertia.error();
+  return SolvePath(chain, path, start, variant, &*inertia);
+}
 
 }  // namespace
 
@@ -426,17 +516,36 @@ Result<PlannedMotion> PlanMotion(const SkillMotion& motion, const kinematics::Ro
   const Planner planner(motion, model, chain, checker, start, options, *prepared);
   std::optional<Error> first_refusal;
   int tried = 0;
-  for (const Branch& branch : FindBranches(chain, prepared->path, start)) {
-    if (tried == std::max(1, options.max_branches)) break;
+  const auto attempt = [&](Result<PlannedMotion> plan) -> std::optional<Result<PlannedMotion>> {
     ++tried;
-    Result<PlannedMotion> plan = planner.From(branch, stop);
-    if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "planning was cancelled"};
+    if (stop.stop_requested()) {
+      return Error{ErrorCode::kCancelled, "planning was cancelled"};
+    }
     if (plan.ok()) {
       plan->report.branches_tried = tried;
       return plan;
     }
     // The best branch's refusal says most about the motion itself.
     if (!first_refusal) first_refusal = plan.error();
+    return std::nullopt;
+  };
+  const PathIkVariant variant = options.inverse_kinematics;
+  if (variant == PathIkVariant::kPlain || variant == PathIkVariant::kEnergy) {
+    Result<PathSolution> path = SolveByFrames(model, chain, prepared->path, start, variant);
+    if (!path.ok()) return path.error();
+    if (auto done = attempt(planner.Along(*path))) return *done;
+    return *first_refusal;
+  }
+  const bool all_demonstrated =
+      options.demonstrated_weight > 0 &&
+      std::find(prepared->demonstrated.begin(), prepared->demonstrated.end(), -1) ==
+          prepared->demonstrated.end();
+  if (all_demonstrated) {
+    if (auto done = attempt(planner.From({prepared->path.style, {}, 0, 0}, stop))) return *done;
+  }
+  for (const Branch& branch : FindBranches(chain, prepared->path, start)) {
+    if (tried >= std::max(1, options.max_branches)) break;
+    if (auto done = attempt(planner.From(branch, stop))) return *done;
   }
   return *first_refusal;
 }

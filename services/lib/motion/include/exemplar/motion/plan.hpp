@@ -12,6 +12,7 @@
 #include "exemplar/collision/scene.hpp"
 #include "exemplar/demonstration/motion.hpp"
 #include "exemplar/kinematics/chain.hpp"
+#include "exemplar/motion/path_ik.hpp"
 
 namespace exemplar::motion {
 
@@ -46,6 +47,7 @@ struct PlanOptions {
   /// What joints tend to where the skill has no joints of the chain (n = chain.dof()); empty:
   /// mid-range.
   Eigen::VectorXd comfortable = {};
+  PathIkVariant inverse_kinematics = PathIkVariant::kExemplar;
   double demonstrated_weight = 1.0;  ///< pull to the demonstrated joints, 0: none
   int max_branches = 6;              ///< ways of standing that are tried before the plan is refused
 };
