@@ -1,12 +1,17 @@
 """A real recorder: killed at random moments, told of events, split, its files labelled."""
 
 import calendar
+import fcntl
 import json
+import os
 import pathlib
+import pty
 import random
+import select
 import shutil
 import subprocess
 import tempfile
+import termios
 import time
 import unittest
 
@@ -132,6 +137,37 @@ class RecorderTest(unittest.TestCase):
                 self.assertEqual([said[1:] for said in after[topic]], [said[1:] for said in sent], topic)
         losses = exemplar("record", "info", self.folder / "data" / "again.mcap")["losses"]
         self.assertEqual(sum(loss["lost_in_gaps"] + loss["lost_at_end"] for loss in losses), 0)
+
+    def test_keys_step_through_a_replay_on_a_terminal(self):
+        _, server = self.programs.recorder()
+        exemplar("record", "start", "--name", "steps", "--server", server)
+        self.replay("--rate", "4").wait(30)
+        exemplar("record", "stop", "--server", server)
+        ours, theirs = pty.openpty()
+        self.addCleanup(os.close, ours)
+        command = [processes.BINARIES / "exemplar", "record", "replay", self.folder / "data" / "steps.mcap", "--paused",
+                   "--wait", "0", "--topic", TOPIC, "--domain", "93", "--station", "test"]
+        player = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
+                                  preexec_fn=lambda: fcntl.ioctl(theirs, termios.TIOCSCTTY, 0))
+        os.close(theirs)
+        self.addCleanup(player.kill)
+        shown = ""
+
+        def shows(text):
+            nonlocal shown
+            while text not in shown:
+                self.assertTrue(select.select([ours], [], [], 20)[0], f"{text!r} is not in {shown!r}")
+                shown += os.read(ours, 4096).decode()
+            shown = shown[shown.index(text) + len(text):]
+
+        shows("space: pause")
+        shows("paused")
+        for number in range(1, 4):
+            os.write(ours, b"s")
+            shows(f" {number} sent")
+        os.write(ours, b"q")
+        shows("3 messages sent")
+        self.assertEqual(player.wait(20), 0)
 
     def test_a_split_recording_has_every_sample_once(self):
         _, server = self.programs.recorder()
