@@ -25,11 +25,11 @@ class StrangersTest(unittest.TestCase):
         self.programs = processes.Programs(self.folder, 95)
         self.addCleanup(self.programs.end)
 
-    def record(self, kind, schema=(), recorder_words=()):
+    def record(self, kind, schema=(), recorder_words=(), partition="test"):
         """The topic as `record info` and the recorder's status show it."""
         _, server = self.programs.recorder("--all-topics", *recorder_words)
         topic = f"lab/{kind}"
-        command = [self.writer, "95", "test", topic, kind, COUNT, *schema]
+        command = [self.writer, "95", partition, topic, kind, COUNT, *schema]
         writer = subprocess.Popen([str(word) for word in command])
         exemplar("record", "start", "--name", kind, "--topic", topic, "--wait", "20", "--server", server)
         self.assertEqual(writer.wait(60), 0, self.programs.logs())
@@ -52,6 +52,10 @@ class StrangersTest(unittest.TestCase):
         found, figures = self.record("keyed", schema=[HERE / "reading.idl"])
         self.assertEqual(found["type"], "lab::v1::KeyedReading")
         self.assertTrue(figures["has_schema"])
+
+    def test_a_topic_without_partition_is_recorded_as_other_middlewares_have_it_by_default(self):
+        found, _ = self.record("keyed", recorder_words=["--schema-dir", HERE], partition="-")
+        self.assertEqual(found["type"], "lab::v1::KeyedReading")
 
     def test_a_keyed_topic_has_its_schema_from_the_folder(self):
         found, _ = self.record("keyed", recorder_words=["--schema-dir", HERE])

@@ -1,5 +1,5 @@
 /* Writes COUNT samples of one topic with Cyclone DDS, waits until they are acknowledged, and goes.
-   usage: writer DOMAIN PARTITION TOPIC plain|keyed COUNT [SCHEMA_FILE] */
+   usage: writer DOMAIN PARTITION|- TOPIC plain|keyed COUNT [SCHEMA_FILE] */
 #include <dds/dds.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
   const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);
   check(participant, "participant");
   dds_qos_t* qos = dds_create_qos();
-  dds_qset_partition(qos, 1, &partition);
+  if (strcmp(partition, "-") != 0) dds_qset_partition(qos, 1, &partition);
   const dds_entity_t publisher = dds_create_publisher(participant, qos, NULL);
   check(publisher, "publisher");
   const dds_topic_descriptor_t* type = keyed ? &lab_v1_KeyedReading_desc : &lab_v1_Reading_desc;
