@@ -46,10 +46,11 @@ class Settings:
         recorder: str | None,
         timeout: float | None,
     ) -> None:
-        one = server or os.environ.get("EXEMPLAR_SERVER") or DEFAULT_SERVER
+        one = checked_address(server or os.environ.get("EXEMPLAR_SERVER") or DEFAULT_SERVER, "server")
+        of_learning = checked_address(learning or one, "learning")
         self._addresses = {
-            "TrialService": checked_address(learning or one, "learning" if learning else "server"),
-            "SkillService": learning or one,
+            "TrialService": of_learning,
+            "SkillService": of_learning,
             "ExecutorService": checked_address(executor or one, "executor"),
             "RecorderService": checked_address(recorder or one, "recorder"),
         }
