@@ -95,13 +95,13 @@ class FclJudge {
   FclJudge(const kinematics::RobotModel& model, const collision::Scene& scene) : model_(model) {
     for (std::size_t link = 0; link < model.links.size(); ++link) {
       for (const kinematics::Geometry& geometry : model.links[link].collisions) {
-        robot_.push_back(
-            {static_cast<int>(link), geometry.link_T_shape, ToFclMesh(geometry.shape)});
+        robot_.push_back({static_cast<int>(link), geometry.link_T_shape, ToFclMesh(geometry.shape),
+                          geometry.shape});
         robot_.back().mesh->computeLocalAABB();
       }
     }
     for (const collision::SceneObject& object : scene.objects) {
-      scene_.push_back({-1, object.base_T_shape, ToFclMesh(object.shape)});
+      scene_.push_back({-1, object.base_T_shape, ToFclMesh(object.shape), object.shape});
       scene_.back().mesh->computeLocalAABB();
     }
   }
@@ -126,12 +126,16 @@ class FclJudge {
     return found;
   }
 
-  /// The smallest distance of the surfaces, or `enough_m` where it is more; 0 where they cross.
+  /// The smallest distance of the surfaces, or `enough_m` where it is more; 0 where they cross, or
+  /// where a thing encloses a part of the robot, which FCL does not see.
   double Distance(const Eigen::VectorXd& q, const LinkPairs& pairs, double enough_m) {
     double smallest = enough_m;
     ForEach(q, pairs,
             [&](const Part& a, const fcl::Transform3d& a_at, const Part& b,
                 const fcl::Transform3d& b_at) {
+              if (b.link < 0 && Encloses(b.shape, b_at.inverse() * (a_at * a.mesh->vertices[0]))) {
+                smallest = 0;
+              }
               if (smallest <= 0 || BoundsAt(a, a_at).distance(BoundsAt(b, b_at)) >= smallest)
                 return;
               fcl::DistanceResultd result;
@@ -146,7 +150,26 @@ class FclJudge {
     int link = -1;  ///< -1: of the scene
     geometry::Pose at;
     std::shared_ptr<FclMesh> mesh;
+    kinematics::Shape shape;
   };
+
+  static bool Encloses(const kinematics::Shape& shape, const Eigen::Vector3d& p) {
+    if (const auto* box = std::get_if<kinematics::Box>(&shape)) {
+      return (p.cwiseAbs().array() <= 0.5 * box->size.array()).all();
+    }
+    if (const auto* sphere = std::get_if<kinematics::Sphere>(&shape)) {
+      return p.norm() <= sphere->radius;
+    }
+    if (const auto* cylinder = std::get_if<kinematics::Cylinder>(&shape)) {
+      return p.head<2>().norm() <= cylinder->radius && std::abs(p.z()) <= 0.5 * cylinder->length;
+    }
+    if (const auto* capsule = std::get_if<kinematics::Capsule>(&shape)) {
+      const double half = 0.5 * capsule->length;
+      const Eigen::Vector3d on_axis(0, 0, std::clamp(p.z(), -half, half));
+      return (p - on_axis).norm() <= capsule->radius;
+    }
+    return false;
+  }
 
   static fcl::AABBd BoundsAt(const Part& part, const fcl::Transform3d& at) {
     const Eigen::Vector3d extent =

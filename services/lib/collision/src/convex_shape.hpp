@@ -91,10 +91,11 @@ struct Separation {
 };
 
 /// Signed distance. Pairs of spheres and capsules, and spheres with boxes and cylinders, by closed
-/// forms; else FCL's GJK between the cores, checked by the support planes at the answer: what is
-/// returned is never more than the true distance by more than rounding. A depth is that of the best
-/// direction found among FCL's contact normals and the bodies' own axes: exact for shallow contacts
-/// of round bodies and for boxes' faces, an upper bound else.
+/// forms; else GJK between the cores, ours and where that is not sure FCL's, checked by the support
+/// planes at the answer: what is returned is never more than the true distance by more than
+/// rounding. A depth is that of the best direction found among FCL's contact normals and the
+/// bodies' own axes: exact for shallow contacts of round bodies and for boxes' faces, an upper
+/// bound else.
 Separation SignedDistance(const ConvexShape& first, const Placement& first_at,
                           const ConvexShape& second, const Placement& second_at);
 
