@@ -13,7 +13,8 @@
 namespace exemplar::learning {
 
 /// Begins exactly at the situation's start; meets the trials' mean contact point where touch was
-/// measured, or where that point predicts left-out trials as well as the path does. Immutable.
+/// measured, or where that point predicts left-out trials clearly better than the path does.
+/// Immutable.
 class FramesModel final : public Model {
  public:
   explicit FramesModel(const Exemplars& exemplars);
