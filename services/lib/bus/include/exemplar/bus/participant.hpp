@@ -23,12 +23,12 @@ struct ParticipantOptions {
   /// IPv4 addresses where other participants are sought beside multicast. The own machine is always
   /// sought, so that a loopback interface without multicast will do.
   std::vector<std::string> peers = {};
-  /// "HOST:PORT" of Fast DDS discovery servers, the first with the id 0, the next 1, and so on. With
-  /// one, nobody is sought by multicast: for networks that do not carry it.
+  /// "HOST:PORT" of Fast DDS discovery servers, the first with the id 0, the next 1, and so on.
+  /// With one, nobody is sought by multicast: for networks that do not carry it.
   std::vector<std::string> discovery_servers = {};
-  /// Topics that this program writes and reads best effort though the table has them reliable: where
-  /// only the newest sample counts ("ircp/joint_state"). Its writers and readers must agree; taps
-  /// read both.
+  /// Topics that this program writes and reads best effort though the table has them reliable:
+  /// where only the newest sample counts ("ircp/joint_state"). Its writers and readers must agree;
+  /// taps read both.
   std::vector<std::string> best_effort_topics = {};
   /// Shared memory for neighbours on the same machine, at most this much of it (less where
   /// /dev/shm is small); 0: UDP only. Holds a few stereo pairs.
