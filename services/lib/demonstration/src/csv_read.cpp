@@ -260,8 +260,8 @@ std::vector<bool> WantedColumns(const CsvLayout& layout, std::size_t width) {
       for (const int column : pose.columns) want(column);
     }
   }
-  for (const ScalarColumns* group :
-       {&layout.joints, &layout.hands, &layout.tactile, &layout.wrench, &layout.label}) {
+  for (const ScalarColumns* group : {&layout.joints, &layout.measured_joints, &layout.hands,
+                                     &layout.tactile, &layout.wrench, &layout.label}) {
     for (const int column : group->columns) want(column);
   }
   return wanted;
