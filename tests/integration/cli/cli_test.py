@@ -380,8 +380,19 @@ class ServiceTest(unittest.TestCase):
         versions = self.json("skill", "versions", "versions")
         self.assertEqual([(v["version"], v["current"], v["method"]) for v in versions], [(1, True, "paper"), (2, False, "frames")])
         self.assertEqual(self.exemplar(*query).stdout, answer)
+        # Killed right after the acknowledgement of a learning.
+        self.assertEqual(self.exemplar("skill", "learn", "versions").returncode, DONE)
+        self.learning.end(signal.SIGKILL)
+        type(self).learning = Learning(self.folder)
+        versions = self.json("skill", "versions", "versions")
+        self.assertEqual([(v["version"], v["current"]) for v in versions], [(1, False), (2, False), (3, True)])
+        self.assertEqual(self.exemplar(*query).returncode, DONE)
         self.assertEqual(self.exemplar("skill", "delete", "versions").returncode, DONE)
         self.assertEqual(self.exemplar("skill", "versions", "versions").returncode, NOT_FOUND)
+        # Numbers go on where the deleted skill's ended.
+        self.assertEqual(self.exemplar("skill", "learn", "versions").returncode, DONE)
+        self.assertEqual([v["version"] for v in self.json("skill", "versions", "versions")], [4])
+        self.assertEqual(self.exemplar("skill", "delete", "versions").returncode, DONE)
         self.assertEqual(len(self.json("trial", "list", *skill)), 5)
 
     def test_suggest_says_where_to_demonstrate_next(self):
