@@ -16,6 +16,8 @@ namespace {
 using eprosima::fastrtps::Duration_t;
 
 constexpr std::chrono::seconds kLastWordsTimeout{2};
+/// Of a writer that keeps all: a reader may be so far behind.
+constexpr std::chrono::seconds kLongestBlocking{10};
 
 Duration_t ToDds(Duration d) {
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(d);
@@ -31,6 +33,10 @@ dds::DataWriterQos WriterQos(const TopicQos& row, std::string_view schema) {
       row.transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = row.depth;
+  if (row.keep_all) {
+    qos.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+    qos.reliability().max_blocking_time = ToDds(kLongestBlocking);
+  }
   dds::ResourceLimitsQosPolicy& limits = qos.resource_limits();
   limits.max_instances = row.max_instances;
   limits.max_samples_per_instance = row.depth;

@@ -29,6 +29,7 @@ TopicQos QosOfTopic(const ircp::RawTopic& topic) {
   }
   qos.reliable = topic.reliable;
   qos.transient_local = topic.transient_local;
+  qos.keep_all = topic.reliable && !topic.transient_local;
   qos.deadline = std::chrono::duration_cast<std::chrono::milliseconds>(topic.deadline);
   return qos;
 }

@@ -22,6 +22,8 @@ struct TopicQos {
   bool transient_local = false;
   /// Longest time between two samples of a writer that works; 0: none.
   std::chrono::milliseconds deadline{0};
+  /// Of reliable writers: a full history waits for its readers instead of losing the oldest sample.
+  bool keep_all = false;
   /// Sent by a thread of the middleware's own: for what is too big for one datagram.
   bool asynchronous = false;
 };
