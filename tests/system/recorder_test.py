@@ -2,7 +2,6 @@
 
 import calendar
 import fcntl
-import json
 import os
 import pathlib
 import pty
@@ -16,6 +15,7 @@ import time
 import unittest
 
 import processes
+import recorded
 import trials
 from processes import exemplar, wait_for
 
@@ -61,7 +61,7 @@ class RecorderTest(unittest.TestCase):
             info = exemplar("record", "info", self.folder / f"{name}.whole.mcap")
             end = exemplar_time(info["start"]) + info["duration_s"]
             self.assertGreater(end, killed - OLDEST_LOST_S, self.programs.logs())
-            numbers = [number for number, *_ in messages(self.folder / f"{name}.whole.mcap")[TOPIC]]
+            numbers = [number for number, *_ in recorded.messages(self.folder / f"{name}.whole.mcap")[TOPIC]]
             self.assertEqual(numbers, list(range(numbers[0], numbers[0] + len(numbers))), "none is missing before the end")
 
     def test_a_full_disk_stops_the_recording_with_what_is_written_intact(self):
@@ -130,7 +130,7 @@ class RecorderTest(unittest.TestCase):
         self.assertEqual(played["refused"], 0)
         left_out = {topic["topic"] for topic in played["topics"] if topic["left_out"]}
         self.assertEqual(left_out, {name for name in left_out if name.endswith(("/status", "/command", "/clock"))})
-        before, after = messages(original), messages(self.folder / "data" / "again.mcap")
+        before, after = recorded.messages(original), recorded.messages(self.folder / "data" / "again.mcap")
         self.assertEqual(len(before[TOPIC]), self.samples)
         for topic, sent in before.items():
             if topic not in left_out:
@@ -182,20 +182,6 @@ class RecorderTest(unittest.TestCase):
         self.assertEqual(sum(info["messages"] for info in infos), stopped["messages"])
         for before, info in zip(files, infos[1:]):
             self.assertEqual(info["metadata"]["exemplar.recording"]["previous_file"], before.name)
-
-
-def messages(file):
-    """Number, source time and bytes of each topic's messages, in order, as the conformance program reads them."""
-    read = subprocess.run([processes.BINARIES / "mcap_conformance", "read", file], check=True, stdout=subprocess.PIPE)
-    channels, by_topic = {}, {}
-    for record in json.loads(read.stdout)["records"]:
-        fields = dict(record["fields"])
-        if record["type"] == "Channel":
-            channels[fields["id"]] = fields["topic"]
-        elif record["type"] == "Message":
-            by_topic.setdefault(channels[fields["channel_id"]], []).append(
-                (int(fields["sequence"]), fields["publish_time"], fields["data"]))
-    return by_topic
 
 
 def exemplar_time(text):
