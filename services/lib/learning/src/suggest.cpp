@@ -25,6 +25,8 @@ constexpr double kBesideLine = 0.5;
 constexpr double kBesidePoint = 0.25;
 // Two suggestions are at least this part of the extent apart.
 constexpr double kApart = 0.3;
+// A place nearer to a trial than this part of the extent is the trial's own.
+constexpr double kAnother = 0.1;
 // The distance from the hull is known to about this part of the extent.
 constexpr double kInside = 2e-3;
 // Trials turned the target if by more than this.
@@ -82,6 +84,7 @@ class Suggester {
     const double apart_m = kApart * Scale();
     for (const Candidate& candidate : candidates) {
       if (static_cast<int>(taken.size()) == count) break;
+      if (candidate.nearest_m < kAnother * Scale()) continue;
       const bool apart = std::all_of(taken.begin(), taken.end(), [&](const Eigen::Vector3d& other) {
         return (other - candidate.place).norm() > apart_m;
       });
