@@ -7,6 +7,7 @@ import tempfile
 import unittest
 
 import processes
+import recorded
 from processes import exemplar
 
 HERE = pathlib.Path(__file__).resolve().parent / "strangers"
@@ -28,6 +29,7 @@ class StrangersTest(unittest.TestCase):
     def record(self, kind, schema=(), recorder_words=(), partition="test"):
         """The topic as `record info` and the recorder's status show it."""
         _, server = self.programs.recorder("--all-topics", *recorder_words)
+        self.server = server
         topic = f"lab/{kind}"
         command = [self.writer, "95", partition, topic, kind, COUNT, *schema]
         writer = subprocess.Popen([str(word) for word in command])
@@ -60,6 +62,19 @@ class StrangersTest(unittest.TestCase):
     def test_a_keyed_topic_has_its_schema_from_the_folder(self):
         found, _ = self.record("keyed", recorder_words=["--schema-dir", HERE])
         self.assertEqual(found["type"], "lab::v1::KeyedReading")
+
+    def test_a_keyed_and_a_plain_topic_are_replayed_byte_for_byte(self):
+        for kind, schema in (("keyed", [HERE / "reading.idl"]), ("plain", ())):
+            self.record(kind, schema=schema)
+            original, again = (self.folder / "data" / f"{name}.mcap" for name in (kind, f"{kind}-again"))
+            exemplar("record", "start", "--name", f"{kind}-again", "--server", self.server)
+            played = exemplar("record", "replay", original, "--rate", "10", "--domain", "95", "--station", "test")
+            exemplar("record", "stop", "--server", self.server)
+            self.assertEqual(played["refused"], 0)
+            topic = f"lab/{kind}"
+            sent, came = (recorded.messages(file)[topic] for file in (original, again))
+            self.assertEqual([said[1:] for said in came], [said[1:] for said in sent])
+            self.programs.end()
 
 
 if __name__ == "__main__":

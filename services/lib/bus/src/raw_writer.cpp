@@ -11,6 +11,8 @@ namespace {
 
 /// What a writer of a type that is not ours keeps for readers that are behind.
 constexpr int kStrangersDepth = 2000;
+/// For readers that are behind.
+constexpr std::chrono::seconds kLongestWait{10};
 constexpr std::string_view kOwnTypes = "exemplar::ircp::v1::";
 
 /// The table's row for types of ours; what the topic says in any case.
@@ -36,8 +38,9 @@ TopicQos QosOfTopic(const ircp::RawTopic& topic) {
 
 class BytesWriter final : public ircp::RawWriter {
  public:
-  BytesWriter(std::unique_ptr<ByteWriter> writer, std::optional<ircp::HeaderLayout> layout)
-      : writer_(std::move(writer)), layout_(layout) {}
+  BytesWriter(std::unique_ptr<ByteWriter> writer, std::optional<ircp::HeaderLayout> layout,
+              bool reliable)
+      : writer_(std::move(writer)), layout_(layout), reliable_(reliable) {}
 
   Status Write(std::span<const std::uint8_t> cdr, Stamp source_stamp) override {
     Bytes bytes;
@@ -54,6 +57,11 @@ class BytesWriter final : public ircp::RawWriter {
         std::copy(std::begin(md5.digest), std::end(md5.digest), bytes.key.begin());
       }
     }
+    Status written = writer_->Write(bytes);
+    if (written.ok() || !reliable_) return written;
+    // Fast DDS 2.9 refuses the sample that fills a history; once the readers have it, there is
+    // room.
+    writer_->WaitForAcknowledgments(kLongestWait);
     return writer_->Write(bytes);
   }
   int matched_readers() const override { return writer_->matched_readers(); }
@@ -64,6 +72,7 @@ class BytesWriter final : public ircp::RawWriter {
  private:
   const std::unique_ptr<ByteWriter> writer_;
   const std::optional<ircp::HeaderLayout> layout_;
+  const bool reliable_;
 };
 
 }  // namespace
@@ -75,7 +84,7 @@ Result<std::unique_ptr<ircp::RawWriter>> OpenRawWriter(DdsStation& station,
       QosOfTopic(topic));
   if (!writer.ok()) return writer.error();
   return std::unique_ptr<ircp::RawWriter>(std::make_unique<BytesWriter>(
-      std::move(*writer), ircp::ReadHeaderLayout(topic.schema, topic.type)));
+      std::move(*writer), ircp::ReadHeaderLayout(topic.schema, topic.type), topic.reliable));
 }
 
 }  // namespace exemplar::bus
