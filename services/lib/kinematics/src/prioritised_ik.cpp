@@ -15,6 +15,8 @@ constexpr double kLongestStep = 0.3;  // rad or m, of one joint
 /// Singular values below this (m or rad of tool a rad of joint) are no way to move.
 constexpr double kSmallestGain = 1e-4;
 constexpr double kDamping = 2e-3;
+/// Of the lower priorities: what those above leave free is often all but singular.
+constexpr double kLowerDamping = 0.05;
 constexpr int kHalvings = 8;
 constexpr int kRestorations = 2;
 constexpr double kPosturePull = 0.3;
@@ -135,6 +137,7 @@ class Solver {
     }
     for (std::size_t l = 0; l < count; ++l) {
       const int level = levels_[l];
+      const double damping = l == 0 ? kDamping : kLowerDamping;
       int rows = 0;
       for (const ToolTask& task : tasks_) rows += task.priority == level ? 6 : 0;
       Eigen::MatrixXd jacobian(rows, n_);
@@ -155,7 +158,7 @@ class Solver {
         const double gain = svd.singularValues()[i];
         if (gain < kSmallestGain) break;
         const Eigen::VectorXd direction = svd.matrixV().col(i);
-        step += rest[i] * gain / (gain * gain + kDamping * kDamping) * direction;
+        step += rest[i] * gain / (gain * gain + damping * damping) * direction;
         free -= direction * direction.transpose();
       }
     }

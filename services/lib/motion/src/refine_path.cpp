@@ -22,6 +22,9 @@ constexpr double kPathStyle = 1e-6;
 constexpr double kEasings[] = {3e-3, 3e-4, 0};
 constexpr int kMostIterations[] = {6, 3, 8};
 constexpr double kSettled[] = {1e-2, 1e-2, 1e-5};
+/// Of the path variant, which has to go further from where it begins: finer, and more of all that.
+constexpr double kPathSettled = 0.01;
+constexpr int kPathPatience = 5;
 constexpr int kMostRefusals = 4;
 /// Systems solved, at most, by the end of each stage: a path that cannot be followed costs no more.
 constexpr int kMostSystems[] = {8, 12, 26};
@@ -51,6 +54,8 @@ class Refiner {
     smooth_.setZero(frames_, 4);
     style_ = problem.style;
     if (variant == PathIkVariant::kPath) {
+      patience_ = kPathPatience;
+      settled_ = kPathSettled;
       const double weight = 1 / Square(kVelocity_rad_per_s * interval);
       style_weight_ = Eigen::ArrayXd::Constant(n_, kPathStyle * weight);
       // Steps themselves count, not those off the style.
@@ -73,11 +78,11 @@ class Refiner {
       easing_ = kEasings[stage];
       solution.cost = Cost(solution.joints);
       double damping = 0;
-      for (int i = 0; i < kMostIterations[stage] && !stop.stop_requested(); ++i) {
+      for (int i = 0; i < patience_ * kMostIterations[stage] && !stop.stop_requested(); ++i) {
         ++solution.iterations;
         const double before = solution.cost;
         Linearise(solution.joints);
-        for (int refused = 0; refused < kMostRefusals && systems_ < kMostSystems[stage];
+        for (int refused = 0; refused < kMostRefusals && systems_ < patience_ * kMostSystems[stage];
              ++refused) {
           if (StepFrom(solution.joints, damping)) {
             for (int k = 0; k < frames_; ++k) {
@@ -95,7 +100,7 @@ class Refiner {
           }
           damping = std::max(damping * 30, 1e-6);
         }
-        if (before - solution.cost <= kSettled[stage] * before) break;
+        if (before - solution.cost <= settled_ * kSettled[stage] * before) break;
       }
     }
     MeasureErrors(chain_, problem_, solution);
@@ -282,6 +287,8 @@ class Refiner {
   Eigen::ArrayXd style_weight_;
   double easing_ = 0;
   int systems_ = 0;
+  int patience_ = 1;
+  double settled_ = 1;
 };
 
 }  // namespace
