@@ -177,6 +177,7 @@ void AddTrialCommands(Command& root, const Session& session) {
       "submit",
       "Stores trial files for a skill; prints their ids.\n\n"
       "A CSV file has one row a sample, a header, SI units: time_s; <joint>_rad (or _m);\n"
+      "<joint>_rad_measured where a robot followed a suit;\n"
       "ee_x_m ee_y_m ee_z_m ee_qx ee_qy ee_qz ee_qw; object_<name>_x_m ... object_<name>_qw;\n"
       "hand_<name>_open; tactile_<sensor>_n; wrench_fx_n ... wrench_tz_nm; label. Only time_s and\n"
       "one of joints or end effector are needed. Poses are in the robot's base frame. The same\n"
