@@ -34,7 +34,11 @@ int main(int argc, char** argv) {
       .MinMax(0, 0.5);
   options.Add("--touch-limit-n", settings.watch.touch_n, "force of a touch that stops a motion")
       .MinMax(0.1, 10000);
+  std::string way = "exemplar";
+  options.Add("--inverse-kinematics", way, "how joints are made to follow a tool path")
+      .OneOf({"exemplar", "plain", "energy", "path"});
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
+  settings.plan.inverse_kinematics = *motion::ParsePathIkVariant(way);
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "executor");
@@ -48,11 +52,16 @@ int main(int argc, char** argv) {
   if (!scene.ok()) return program::Fail(kName, scene.error());
   const auto clients = rpc::Connect({.server = learning, .request_id = "executor"});
   if (!clients.ok()) return program::Fail(kName, clients.error());
-  auto participant = bus::Participant::Create({.domain = options.common().domain,
-                                               .station = options.common().station,
-                                               .name = kName,
-                                               .clock = &clock,
-                                               .log = log.get()});
+  auto participant =
+      bus::Participant::Create({.domain = options.common().domain,
+                                .station = options.common().station,
+                                .name = kName,
+                                .interfaces = options.common().interfaces,
+                                .peers = options.common().peers,
+                                .discovery_servers = options.common().discovery_servers,
+                                .best_effort_topics = options.common().best_effort,
+                                .clock = &clock,
+                                .log = log.get()});
   if (!participant.ok()) return program::Fail(kName, participant.error());
   auto app = executor::Executor::Create(**participant, clock, *log, *clients->skills, *robot,
                                         *scene, settings);
