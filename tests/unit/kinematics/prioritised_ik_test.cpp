@@ -134,17 +134,17 @@ TEST(SolvePrioritised, MovesLeonardosElbowAsideWithoutMovingTheFinger) {
   ASSERT_EQ(group.dof(), 9);
   const geometry::Pose tool = group.chains()[0].ToolPose(robot.home);
   geometry::Pose elbow = group.chains()[1].ToolPose(group.Of(1, robot.home));
-  elbow.translation.y() -= 0.05;
+  constexpr double kAside_m = 0.05;
+  elbow.translation.y() -= kAside_m;
   const Result<PrioritisedSolution> solution = SolvePrioritised(
       group,
       std::vector<ToolTask>{
-          {.chain = 0, .base_T_tool = tool},
+          {.chain = 0, .base_T_tool = tool, .use_rotation = false},
           {.chain = 1, .base_T_tool = elbow, .use_rotation = false, .priority = 1}},
       robot.home, {.max_restarts = 0});
   ASSERT_TRUE(solution.ok()) << solution.error().message;
   EXPECT_LE(solution->position_error_m[0], 1e-5);
-  EXPECT_LE(solution->rotation_error_rad[0], 1e-5);
-  EXPECT_LT(solution->position_error_m[1], 0.025) << "half of the way at least";
+  EXPECT_LT(solution->position_error_m[1], 0.5 * kAside_m) << "half of the way at least";
   EXPECT_TRUE(Within(group, solution->q));
 }
 
