@@ -176,6 +176,21 @@ TEST_F(PlanOnArm7, RefusesAPathOutOfReachAndNamesTheFrame) {
   EXPECT_NE(plan.error().message.find("mm away"), std::string::npos) << plan.error().message;
 }
 
+TEST_F(PlanOnArm7, RefusesWhereNoFreedomIsLeftAndSaysWhenWhichHowDeepAndWhere) {
+  const SkillMotion press = MakePress(HomePose(), kTarget);
+  // A ball on the tool's own way.
+  const Eigen::Vector3d between =
+      0.5 * (press.base_T_tool[0].translation + press.base_T_tool[90].translation);
+  scene_.objects.push_back(
+      {"ball", geometry::Pose::FromTranslation(between), kinematics::Sphere{0.02}});
+  const Result<PlannedMotion> plan = Plan(press);
+  ASSERT_FALSE(plan.ok());
+  const std::string& said = plan.error().message;
+  for (const char* part : {"at ", " s \"", "\"ball\"", " mm ", " near ("}) {
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  }
+}
+
 TEST_F(PlanOnArm7, RefusesAThinPlateThatFramesStepOver) {
   // Across the way of the finger, far thinner than the step between frames.
   const geometry::Pose home = HomePose();

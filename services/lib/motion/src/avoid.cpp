@@ -9,10 +9,14 @@
 namespace exemplar::motion {
 namespace {
 
-/// A quarter of a second before something is near the joints begin to turn away.
-constexpr double kNotice_s = 0.25;
+/// So long before something is near the joints begin to turn away.
+constexpr double kNotice_s = 0.5;
+/// How closely the joints keep to the style that leads away.
+constexpr double kAvoidingDeviation_rad = 0.1;
 constexpr double kLargestShift_rad = 0.4;
 constexpr double kDamping = 1e-6;
+/// How far from the axes about which the free joints turn them bodies lie, about.
+constexpr double kLever_m = 0.3;
 /// Of the gradient: less of it in the null space is no freedom to speak of.
 constexpr double kLeastFreedom = 1e-2;
 
@@ -51,8 +55,10 @@ std::optional<PathProblem> AwayFromObstacles(const kinematics::RobotModel& model
     for (int j = 0; j < chain.dof(); ++j) along[j] = gradient[chain.joint_indices()[j]];
     const Eigen::VectorXd free = InNullSpace(chain, q, problem.use_rotation, along);
     if (free.norm() < kLeastFreedom * along.norm()) continue;
-    // One Gauss-Newton step: linearly, the cost of one near pair vanishes there.
-    Eigen::VectorXd step = -2 * cost / along.dot(free) * free;
+    // What takes a body at this lever as far away as its distance lacks. The step that makes the
+    // whole cost vanish would be wild where most of the cost is of pairs that the null space cannot
+    // move.
+    Eigen::VectorXd step = -free / (2 * kLever_m * kLever_m);
     if (step.norm() > kLargestShift_rad) step *= kLargestShift_rad / step.norm();
     shift.row(k) = step.transpose();
     near[static_cast<std::size_t>(k)] = true;
@@ -60,6 +66,7 @@ std::optional<PathProblem> AwayFromObstacles(const kinematics::RobotModel& model
   }
   if (!any) return std::nullopt;
   PathProblem away = problem;
+  away.style_deviation_rad = problem.style_deviation_rad.cwiseMin(kAvoidingDeviation_rad);
   for (Eigen::Index k = 0; k < frames; ++k) {
     double weight = 0;
     double sum = 0;
@@ -73,8 +80,9 @@ std::optional<PathProblem> AwayFromObstacles(const kinematics::RobotModel& model
       sum += share;
       mean += share * shift.row(other);
     }
-    if (weight <= 0) continue;
-    away.style.row(k) = (1 - weight) * problem.style.row(k) + weight * (joints.row(k) + mean / sum);
+    // The answer so far is the style elsewhere, so that what was won stays.
+    away.style.row(k) = joints.row(k);
+    if (weight > 0) away.style.row(k) += weight * mean / sum;
   }
   return away;
 }

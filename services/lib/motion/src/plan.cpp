@@ -26,7 +26,7 @@ constexpr double kSameStart_rad = 0.25;
 constexpr double kRoughSmoothness = 1e-4;
 /// Beyond the clearance asked for, where joints turn away from obstacles.
 constexpr double kAvoidingMargin_m = 0.02;
-constexpr int kAvoidingRounds = 6;
+constexpr int kAvoidingRounds = 10;
 
 std::string FrameAt(const SkillMotion& motion, int frame) {
   return "frame " + std::to_string(frame) + " of " + std::to_string(motion.frames()) + " (" +
