@@ -261,7 +261,12 @@ int main(int argc, char** argv) {
       with.sampled_allowed_states = 0;
     }
     std::string title = short_name;
-    if (testing::GiveBones(*model, folder) > 0) title += " (bones for its meshes)";
+    if (testing::GiveBones(*model, folder) > 0) {
+      title += " (bones for its meshes)";
+      with.sampled_allowed_states = 0;
+      with.allowed_pairs = testing::AlmostAlwaysTouching(
+          *model, *collision::CheckedLinkPairs(*model, *collision::MakeRobotParts(*model), {}));
+    }
     const Eigen::VectorXd zero =
         Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model->joints.size()));
     Eigen::VectorXd home = zero;

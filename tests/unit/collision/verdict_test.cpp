@@ -61,6 +61,9 @@ std::vector<Robot> RealRobots(const fs::path& bones) {
   for (const char* name : {"ur5e", "icub"}) {
     Robot robot{name, *kinematics::ReadUrdf(folder / (std::string(name) + ".urdf")), {}};
     EXPECT_GT(testing::GiveBones(robot.model, bones), 0);
+    robot.options.sampled_allowed_states = 0;
+    robot.options.allowed_pairs = testing::AlmostAlwaysTouching(
+        robot.model, *CheckedLinkPairs(robot.model, *MakeRobotParts(robot.model), {}));
     robots.push_back(robot);
   }
   return robots;
