@@ -101,6 +101,25 @@ def test_cancelling_a_call_is_an_error_and_cancelling_a_task_is_asyncios(
     run(station, body)
 
 
+def test_closing_the_client_ends_what_waits(silent: str) -> None:
+    async def body() -> None:
+        client = exemplar.AsyncClient(silent)
+        waiting = [
+            asyncio.create_task(client.skills.list()),
+            asyncio.create_task(client.skills.learn("press").result()),
+        ]
+        async with client.skills.query_stream("press") as stream:
+            waiting.append(asyncio.create_task(stream.query({"target": BUTTON})))
+            await asyncio.sleep(0.05)
+            await client.close()
+            for outcome in await asyncio.gather(*waiting, return_exceptions=True):
+                assert isinstance(outcome, exemplar.CancelledError), outcome
+        with pytest.raises(exemplar.FailedPreconditionError, match="closed"):
+            await client.skills.list()
+
+    asyncio.run(body())
+
+
 def test_errors_and_deadlines_are_those_of_the_other_client(
     station: Station, press: exemplar.Skill, silent: str
 ) -> None:

@@ -1,6 +1,7 @@
 """What needs no service: poses, trial files, addresses."""
 
 import dataclasses
+import importlib.resources
 import pathlib
 
 import numpy as np
@@ -124,6 +125,17 @@ def test_addresses_are_checked_and_default_to_the_environment(monkeypatch: pytes
     with pytest.raises(exemplar.InvalidArgumentError) as refused:
         exemplar.Client("127.0.0.1:1", recorder="x")
     assert refused.value.field == "recorder"
+
+
+def test_a_client_that_was_closed_says_so() -> None:
+    with exemplar.Client("127.0.0.1:1") as client:
+        pass
+    with pytest.raises(exemplar.FailedPreconditionError, match="closed"):
+        client.skills.list()
+
+
+def test_the_package_announces_its_types() -> None:
+    assert importlib.resources.files("exemplar").joinpath("py.typed").is_file()
 
 
 def test_nobody_at_the_address_is_unavailable() -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 import grpc
 import grpc.aio
 
 from . import _calls
-from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings
-from ._errors import CancelledError, from_rpc
+from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings, closed
+from ._errors import CancelledError, ExemplarError, from_rpc
 from ._pose import Objects, PoseLike
 from ._values import Motion
 from ._wire import Message, Method
@@ -35,7 +36,6 @@ class AsyncOperation(Generic[P, T]):
         self._outcome = Outcome(call)
         self._stream = stream
         self._address = address
-        self._cancelled = False
 
     def __aiter__(self) -> AsyncIterator[P]:
         return self
@@ -44,21 +44,15 @@ class AsyncOperation(Generic[P, T]):
         if self._outcome.ended:
             raise StopAsyncIteration
         try:
-            message = await self._stream.read()
-            if message is not grpc.aio.EOF:
-                progress = self._outcome.take(message)
-                if progress is not None:
-                    return progress
-                await self._stream.read()
-        except grpc.aio.AioRpcError as error:
-            raise self._outcome.fail(from_rpc(error, self._address)) from None
-        except asyncio.CancelledError:
-            # gRPC raises the same for a call that was cancelled as asyncio does for the task that waits.
-            if not self._cancelled or _task_is_cancelled():
-                raise
-            message = f"the call to {self._address} was cancelled"
-            raise self._outcome.fail(CancelledError(message)) from None
-        self._outcome.finish()
+            with _errors_of(self._address):
+                while (message := await self._stream.read()) is not grpc.aio.EOF:
+                    progress = self._outcome.take(message)
+                    if progress is not None:
+                        return progress
+        except ExemplarError as error:
+            self._outcome.finish(error)
+        else:
+            self._outcome.finish()
         raise StopAsyncIteration
 
     async def result(self) -> T:
@@ -69,7 +63,6 @@ class AsyncOperation(Generic[P, T]):
 
     def cancel(self) -> None:
         """Ends the call; iterating over it and its result raise CancelledError."""
-        self._cancelled = True
         self._stream.cancel()
 
     async def __aenter__(self) -> AsyncOperation[P, T]:
@@ -91,7 +84,13 @@ class AsyncMotionStream:
         self._address = link.settings.address(questions.method)
         self._lock = asyncio.Lock()
         open_stream = link.channel(questions.method).stream_stream(questions.method.path, **questions.method.codec())
-        self._stream = open_stream(timeout=_calls.limit_s(None, timeout, long=True), metadata=link.settings.metadata())
+        # A queue, as a write of gRPC's own outlives a stream that ends before it is connected.
+        self._requests: asyncio.Queue[Message] = asyncio.Queue()
+        self._stream = open_stream(
+            self._sent(),
+            timeout=_calls.limit_s(None, timeout, long=True),
+            metadata=link.settings.metadata(),
+        )
 
     async def query(
         self,
@@ -103,16 +102,16 @@ class AsyncMotionStream:
         """As `client.skills.query`. An error of the question leaves the stream open; one of the connection ends it."""
         async with self._lock:
             request = self._questions.request(objects, start, joint_start)
-            try:
-                await self._stream.write(request)
+            self._requests.put_nowait(request)
+            with _errors_of(self._address):
                 while (answer := await self._stream.read()) is not grpc.aio.EOF:
                     if self._questions.answers(answer):
                         return self._questions.read(answer)
-            except grpc.aio.AioRpcError as error:
-                raise from_rpc(error, self._address) from None
-            except asyncio.InvalidStateError:
-                pass  # a stream that has ended cannot be written to
         raise self._questions.ended(self._address)
+
+    async def _sent(self) -> AsyncIterator[Message]:
+        while True:
+            yield await self._requests.get()
 
     async def close(self) -> None:
         """Ends the stream."""
@@ -131,16 +130,20 @@ class AsyncLink:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self._channels: dict[str, grpc.aio.Channel] = {}
+        self._closed = False
 
     def channel(self, method: Method) -> Any:
         """The channel to who serves a method."""
         address = self.settings.address(method)
+        if self._closed:
+            raise closed()
         if address not in self._channels:
             self._channels[address] = grpc.aio.insecure_channel(address, options=CHANNEL_OPTIONS)
         return self._channels[address]
 
     async def close(self) -> None:
         """Ends all calls."""
+        self._closed = True
         channels, self._channels = self._channels, {}
         for channel in channels.values():
             await channel.close()
@@ -158,10 +161,8 @@ class AsyncLink:
     async def download(self, call: _calls.Download, timeout: float | None = None) -> bytes:
         """The file's bytes."""
         stream = self._open(call.method, call.request, _calls.limit_s(self.settings.timeout, timeout, False))
-        try:
+        with _errors_of(self.settings.address(call.method)):
             return b"".join([part.chunk.data async for part in stream])
-        except grpc.aio.AioRpcError as error:
-            raise from_rpc(error, self.settings.address(call.method)) from None
 
     def long(self, call: _calls.Long[P, T], timeout: float | None = None) -> AsyncOperation[P, T]:
         """Begins."""
@@ -174,12 +175,20 @@ class AsyncLink:
 
     async def _wait(self, method: Method, invoke: Any, request: Any, timeout: float | None, long: bool) -> Message:
         limit_s = _calls.limit_s(self.settings.timeout, timeout, long)
-        try:
+        with _errors_of(self.settings.address(method)):
             return await invoke(request, timeout=limit_s, metadata=self.settings.metadata())
-        except grpc.aio.AioRpcError as error:
-            raise from_rpc(error, self.settings.address(method)) from None
 
 
-def _task_is_cancelled() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
+@contextmanager
+def _errors_of(address: str) -> Iterator[None]:
+    """Turns what gRPC raises into our exceptions."""
+    try:
+        yield
+    except grpc.aio.AioRpcError as error:
+        raise from_rpc(error, address) from None
+    except asyncio.CancelledError:
+        # gRPC raises the same for a call that was cancelled as asyncio does for the task that waits for it.
+        task = asyncio.current_task()
+        if task is None or task.cancelling() > 0:
+            raise
+        raise CancelledError(f"the call to {address} was cancelled") from None

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 from . import _calls, _read
 from ._errors import (
     ExemplarError,
+    FailedPreconditionError,
     InternalError,
     InvalidArgumentError,
     UnavailableError,
@@ -76,6 +77,11 @@ def checked_address(address: str, name: str) -> str:
     return address
 
 
+def closed() -> ExemplarError:
+    """What is raised by a client that was closed."""
+    return FailedPreconditionError("the client is closed")
+
+
 class Outcome(Generic[P, T]):
     """What has come of a long call so far."""
 
@@ -96,16 +102,11 @@ class Outcome(Generic[P, T]):
             return None
         return self._call.read_progress(getattr(message, self._call.progress))
 
-    def fail(self, error: ExemplarError) -> ExemplarError:
-        """Keeps the error, unless the result is there already."""
+    def finish(self, error: ExemplarError | None = None) -> None:
+        """The call has ended; how does not matter any more once the result is there. Raises what ended it instead."""
         if self._result is None:
-            self._error = error
-        return error
-
-    def finish(self) -> None:
-        """The stream has ended."""
-        if not self.ended:
-            raise self.fail(InternalError("the service ended the call without a result"))
+            self._error = error or InternalError("the service ended the call without a result")
+            raise self._error from None
 
     def value(self) -> T:
         """The result; raises what ended the call instead."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 import grpc
 
 from . import _calls
-from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings
+from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings, closed
 from ._errors import from_rpc
 from ._pose import Objects, PoseLike
 from ._values import Motion
@@ -43,16 +44,15 @@ class Operation(Generic[P, T]):
         if self._outcome.ended:
             raise StopIteration
         try:
-            progress = self._outcome.take(next(self._stream))
-            if progress is None:
-                next(self._stream, None)
-                raise StopIteration
-            return progress
-        except StopIteration:
-            self._outcome.finish()
-            raise
+            for message in self._stream:
+                progress = self._outcome.take(message)
+                if progress is not None:
+                    return progress
         except grpc.RpcError as error:
-            raise self._outcome.fail(from_rpc(error, self._address)) from None
+            self._outcome.finish(from_rpc(error, self._address))
+        else:
+            self._outcome.finish()
+        raise StopIteration
 
     def result(self) -> T:
         """Waits for the end. Raises what the service refused or what broke the call."""
@@ -97,12 +97,10 @@ class MotionStream:
         """As `client.skills.query`. An error of the question leaves the stream open; one of the connection ends it."""
         with self._lock:
             self._requests.put(self._questions.request(objects, start, joint_start))
-            try:
+            with _errors_of(self._address):
                 for answer in self._answers:
                     if self._questions.answers(answer):
                         return self._questions.read(answer)
-            except grpc.RpcError as error:
-                raise from_rpc(error, self._address) from None
         raise self._questions.ended(self._address)
 
     def close(self) -> None:
@@ -123,12 +121,15 @@ class Link:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self._channels: dict[str, grpc.Channel] = {}
+        self._closed = False
         self._lock = threading.Lock()
 
     def channel(self, method: Method) -> Any:
         """The channel to who serves a method."""
         address = self.settings.address(method)
         with self._lock:
+            if self._closed:
+                raise closed()
             if address not in self._channels:
                 self._channels[address] = grpc.insecure_channel(address, options=CHANNEL_OPTIONS)
             return self._channels[address]
@@ -136,6 +137,7 @@ class Link:
     def close(self) -> None:
         """Ends all calls."""
         with self._lock:
+            self._closed = True
             for channel in self._channels.values():
                 channel.close()
             self._channels.clear()
@@ -153,10 +155,8 @@ class Link:
     def download(self, call: _calls.Download, timeout: float | None = None) -> bytes:
         """The file's bytes."""
         stream = self._open(call.method, call.request, _calls.limit_s(self.settings.timeout, timeout, False))
-        try:
+        with _errors_of(self.settings.address(call.method)):
             return b"".join(part.chunk.data for part in stream)
-        except grpc.RpcError as error:
-            raise from_rpc(error, self.settings.address(call.method)) from None
 
     def long(self, call: _calls.Long[P, T], timeout: float | None = None) -> Operation[P, T]:
         """Begins."""
@@ -169,7 +169,14 @@ class Link:
 
     def _wait(self, method: Method, invoke: Any, request: Any, timeout: float | None, long: bool) -> Message:
         limit_s = _calls.limit_s(self.settings.timeout, timeout, long)
-        try:
+        with _errors_of(self.settings.address(method)):
             return invoke(request, timeout=limit_s, metadata=self.settings.metadata())
-        except grpc.RpcError as error:
-            raise from_rpc(error, self.settings.address(method)) from None
+
+
+@contextmanager
+def _errors_of(address: str) -> Iterator[None]:
+    """Turns what gRPC raises into our exceptions."""
+    try:
+        yield
+    except grpc.RpcError as error:
+        raise from_rpc(error, address) from None
