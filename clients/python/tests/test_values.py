@@ -94,9 +94,9 @@ def test_a_trial_file_comes_back_exactly(tmp_path: pathlib.Path) -> None:
         ("time_s,ee_x_m,ee_y_m\n0,1,2\n", "ee_z_m"),
         ("time_s,elbow_rad,elbow_rad\n0,1,2\n", "twice"),
         ("time_s,other\n0,1\n", "neither joints"),
-        ("time_s,elbow_rad\n0,one\n", "one"),
+        ("time_s,elbow_rad\n0,one\n", 'elbow_rad: "one"'),
         ("time_s,elbow_rad\n0,1\n0,2\n", "increasing"),
-        ("time_s,elbow_rad\n0,1\n1\n", ""),
+        ("time_s,elbow_rad\n0,1\n1\n", "sample 2 has 1 cells"),
         ("time_s,a_rad,b_rad\n0,1,2\n1,3,\n", "b_rad"),
     ],
 )

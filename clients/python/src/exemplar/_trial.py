@@ -127,17 +127,16 @@ class Trial:
 
     @classmethod
     def _from_text(cls, text: str, source: str) -> Trial:
-        rows = list(csv.reader(io.StringIO(text)))
+        rows = [row for row in csv.reader(io.StringIO(text)) if row]
         if len(rows) < 2:
             raise InvalidArgumentError(f"{source} holds no samples", source)
         header = [name.strip() for name in rows[0]]
-        try:
-            cells = [[float(cell) if cell.strip() else np.nan for cell in row] for row in rows[1:] if row]
-            table = np.array(cells, dtype=float)
-        except ValueError as error:
-            raise InvalidArgumentError(f"{source}: {error}", source) from error
-        if table.shape[1:] != (len(header),):
-            raise InvalidArgumentError(f"{source}: rows differ in length from the header", source)
+        table = np.empty((len(rows) - 1, len(header)))
+        for sample, row in enumerate(rows[1:]):
+            if len(row) != len(header):
+                what = f"has {len(row)} cells, the header {len(header)}"
+                raise InvalidArgumentError(f"{source}: sample {sample + 1} {what}", source)
+            table[sample] = [_cell(word, sample, name, source) for word, name in zip(row, header, strict=True)]
         return _Columns(header, table, source).trial()
 
     def _columns(self) -> Iterable[tuple[Array, list[str], Array]]:
@@ -159,12 +158,12 @@ class Trial:
             names = [f"hand_{name}_open" if name else "hand_open" for name in self.hands.names]
             yield self.hands.time_s, names, self.hands.values
         if self.tactile is not None:
-            yield (
-                self.tactile.time_s,
-                [f"tactile_{s}_n" for s in self.tactile.names],
-                self.tactile.values,
-            )
+            names = [f"tactile_{name}_n" for name in self.tactile.names]
+            yield self.tactile.time_s, names, self.tactile.values
         if self.wrench is not None:
+            for name in self.wrench.names:
+                if name not in _WRENCH:
+                    raise InvalidArgumentError(f'wrench channel "{name}" is none of {", ".join(_WRENCH)}', "wrench")
             names = [f"wrench_{name}{_WRENCH[name]}" for name in self.wrench.names]
             yield self.wrench.time_s, names, self.wrench.values
         if self.label is not None:
@@ -181,47 +180,48 @@ class _Columns:
             raise InvalidArgumentError(f"{source}: no column time_s in the header", "time_s")
         self._column = {name: table[:, i] for i, name in enumerate(header)}
         self._source = source
-        self._time_s = self._column.pop("time_s") - self._column_first(table, header)
-
-    @staticmethod
-    def _column_first(table: Array, header: list[str]) -> float:
-        return float(table[0, header.index("time_s")])
+        time_s = self._column.pop("time_s")
+        self._time_s = time_s - time_s[0]
 
     def trial(self) -> Trial:
+        """The groups that are known by their names; all other columns are left over."""
         end_effectors = self._poses("ee", may_be_unnamed=True)
         objects = self._poses("object", may_be_unnamed=False)
-        hands = {
-            n: n.removeprefix("hand").removesuffix("open").strip("_")
-            for n in self._column
-            if n == "hand_open" or (n.startswith("hand_") and n.endswith("_open"))
-        }
-        hand_series = self._scalars(hands)
-        tactile = self._scalars({n: n[8:-2] for n in self._column if n.startswith("tactile_") and n.endswith("_n")})
-        wrench = self._scalars({f"wrench_{n}{u}": n for n, u in _WRENCH.items() if f"wrench_{n}{u}" in self._column})
-        label = self._scalars({n: n for n in self._column if n == "label"})
-        measured = self._scalars(
-            {n: n.rsplit("_", 2)[0] for n in self._column if n.endswith(("_rad_measured", "_m_measured"))}
-        )
-        names = {n: n.rsplit("_", 1)[0] for n in self._column if n.endswith(("_rad", "_m"))}
-        prismatic = tuple(joint for column, joint in names.items() if column.endswith("_m"))
-        joints = self._scalars(names)
+        hands = {"hand_open": ""} if "hand_open" in self._column else {}
+        hand_series = self._scalars({**hands, **self._between("hand_", "_open")})
+        tactile = self._scalars(self._between("tactile_", "_n"))
+        forces = {f"wrench_{name}{unit}": name for name, unit in _WRENCH.items()}
+        wrench = self._scalars({column: name for column, name in forces.items() if column in self._column})
+        label = self._scalars({"label": "label"} if "label" in self._column else {})
+        measured = self._scalars({**self._between("", "_rad_measured"), **self._between("", "_m_measured")})
+        prismatic = self._between("", "_m")
+        both = {**self._between("", "_rad"), **prismatic}
+        joints = self._scalars({column: both[column] for column in self._column if column in both})
         if joints is None and not end_effectors:
-            raise InvalidArgumentError(
-                f"{self._source}: neither joints nor an end effector among the columns", "ee_x_m"
-            )
+            what = "neither joints nor an end effector among the columns"
+            raise InvalidArgumentError(f"{self._source}: {what}", "ee_x_m")
         return Trial(
-            joints,
-            measured,
-            prismatic,
-            end_effectors,
-            objects,
-            hand_series,
-            tactile,
-            wrench,
-            label,
-            self._source,
+            joints=joints,
+            measured_joints=measured,
+            prismatic_joints=tuple(prismatic.values()),
+            end_effectors=end_effectors,
+            objects=objects,
+            hands=hand_series,
+            tactile=tactile,
+            wrench=wrench,
+            label=label,
+            source=self._source,
             notices=tuple(f'column "{name}" is ignored' for name in self._column),
         )
+
+    def _between(self, prefix: str, suffix: str) -> dict[str, str]:
+        """Columns with what stands between prefix and suffix."""
+        named = {}
+        for column in self._column:
+            name = column.removeprefix(prefix).removesuffix(suffix)
+            if name and column == prefix + name + suffix:
+                named[column] = name
+        return named
 
     def _poses(self, prefix: str, may_be_unnamed: bool) -> dict[str, PoseSeries]:
         series = {}
@@ -259,6 +259,15 @@ class _Columns:
                 name,
             )
         return self._time_s[rows], values[rows]
+
+
+def _cell(word: str, sample: int, column: str, source: str) -> float:
+    """A number; NaN for an empty cell."""
+    try:
+        return float(word) if word.strip() else np.nan
+    except ValueError:
+        what = f'"{word}" is no number'
+        raise InvalidArgumentError(f"{source}: sample {sample + 1}: {column}: {what}", column) from None
 
 
 def _times(values: npt.ArrayLike) -> Array:
