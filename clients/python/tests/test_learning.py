@@ -193,15 +193,17 @@ def test_errors_name_code_and_field(client: exemplar.Client, press: exemplar.Ski
         client.robot.status()
 
 
-def test_a_cancelled_learning_changes_nothing(client: exemplar.Client, press: exemplar.Skill) -> None:
-    before = client.skills.versions("press")
-    learning = press.learn()
-    learning.cancel()
-    with pytest.raises(exemplar.CancelledError):
-        learning.result()
-    with pytest.raises(exemplar.CancelledError):
-        learning.result()
-    assert client.skills.versions("press") == before
+def test_a_call_that_is_cancelled_stays_cancelled(silent: str) -> None:
+    with exemplar.Client(silent) as client:
+        learning = client.skills.learn("press")
+        threading.Timer(0.02, learning.cancel).start()
+        for _ in range(2):
+            with pytest.raises(exemplar.CancelledError):
+                learning.result()
+        with client.skills.learn("press") as left:
+            pass
+        with pytest.raises(exemplar.CancelledError):
+            left.result()
 
 
 def test_a_call_has_a_deadline(silent: str) -> None:
