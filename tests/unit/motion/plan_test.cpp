@@ -176,6 +176,28 @@ TEST_F(PlanOnArm7, RefusesAPathOutOfReachAndNamesTheFrame) {
   EXPECT_NE(plan.error().message.find("mm away"), std::string::npos) << plan.error().message;
 }
 
+TEST_F(PlanOnArm7, TurnsItsElbowAwayFromAnObstacle) {
+  SkillMotion sideways = MakePress(HomePose(), {0.45, 0.3, 0.15}, {.reach_s = 2.5});
+  sideways.contacts.clear();
+  const Result<PlannedMotion> alone = Plan(sideways);
+  ASSERT_TRUE(alone.ok()) << alone.error().message;
+  // A ball beside the elbow where the motion ends, a good centimetre into it.
+  std::vector<geometry::Pose> poses;
+  const Eigen::VectorXd end = At(alone->trajectory, alone->trajectory.duration_s());
+  kinematics::LinkPoses(robot_.model, kinematics::FullJointVector(robot_.model, robot_.chain, end),
+                        poses);
+  const geometry::Pose& elbow = poses[static_cast<std::size_t>(robot_.model.FindLink("link4"))];
+  scene_.objects.push_back(
+      {"ball", geometry::Pose::FromTranslation(elbow.translation + Eigen::Vector3d(0, 0.1, 0)),
+       kinematics::Sphere{0.06}});
+  ASSERT_LT(SampledClearance(alone->trajectory, false), 0);
+  const Result<PlannedMotion> plan = Plan(sideways);
+  ASSERT_TRUE(plan.ok()) << plan.error().message;
+  EXPECT_GE(SampledClearance(plan->trajectory, false), options_.required_clearance_m - 1e-4);
+  EXPECT_LE(plan->report.max_position_error_m, options_.free_tolerance_m);
+  EXPECT_LE(plan->report.max_rotation_error_rad, options_.rotation_tolerance_rad);
+}
+
 TEST_F(PlanOnArm7, RefusesWhereNoFreedomIsLeftAndSaysWhenWhichHowDeepAndWhere) {
   const SkillMotion press = MakePress(HomePose(), kTarget);
   // A ball on the tool's own way.
