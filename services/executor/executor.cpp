@@ -15,6 +15,7 @@ constexpr const char* kProgram = "executor";
 constexpr double kBeat_s = 0.1;
 constexpr int kControlPriority = 40;
 constexpr Duration kShutdownPatience = std::chrono::seconds(5);
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
 Error Refused(State state, Event event, const std::string& holder) {
   std::string message =
@@ -35,12 +36,12 @@ Executor::Executor(const Clock& clock, Log& log, api::SkillApi& skills,
                    ExecutorOptions options)
     : clock_(clock),
       log_(log),
-      skills_(skills),
       robot_(robot),
-      scene_(scene),
       options_(std::move(options)),
       view_(robot.chain.joint_names()),
-      state_received_ns_(std::numeric_limits<std::int64_t>::min()) {}
+      planner_(clock, skills, robot, scene, view_, options_.planner),
+      state_received_ns_(kNever),
+      safety_received_ns_(kNever) {}
 
 Result<std::unique_ptr<Executor>> Executor::Create(ircp::Bus& bus, const Clock& clock, Log& log,
                                                    api::SkillApi& skills,
@@ -55,8 +56,9 @@ Result<std::unique_ptr<Executor>> Executor::Create(ircp::Bus& bus, const Clock& 
     return InvalidArgument("robot \"" + robot.name + "\" has " + std::to_string(robot.chain.dof()) +
                            " joints, at most " + std::to_string(kMaxJoints) + " can be commanded");
   }
-  options.plan.touch_links = robot.touch_links;
-  options.plan.comfortable = robot.home;
+  options.watch.command_period = FromSeconds(1 / options.rate_hz);
+  options.planner.plan.touch_links = robot.touch_links;
+  options.planner.plan.comfortable = robot.home;
   // Meshes and shapes are looked at once now, so that a bad one shows before anything moves.
   const Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
       robot.model, collision::MakeScene(scene), collision::OptionsOf(robot));
@@ -208,6 +210,7 @@ ircp::Answer Executor::OnCommand(const ircp::CommandSample& command) {
 }
 
 void Executor::OnSafety(const ircp::SafetySample& sample) {
+  safety_received_ns_.store(clock_.Steady().count());
   if (sample.emergency_stop) {
     (void)Apply(Event::kEmergency, "emergency stop by " + sample.header.source);
   } else if (sample.reset && state_.load() == State::kEmergencyStop) {
@@ -224,15 +227,33 @@ void Executor::OnJointState(const ircp::JointStateSample& sample) {
   {
     const std::lock_guard lock(mutex_);
     if (!run_over_) run = run_;
-    if (run) run->Measure(*state);
+    if (run) run->Measure(*state, commands_->sent());
   }
   if (run) changed_.notify_all();
 }
 
 std::optional<Duration> Executor::StateAge() const {
   const std::int64_t received = state_received_ns_.load();
-  if (received == std::numeric_limits<std::int64_t>::min()) return std::nullopt;
+  if (received == kNever) return std::nullopt;
   return clock_.Steady() - Duration(received);
+}
+
+std::optional<std::string> Executor::SafetySilence() const {
+  if (options_.safety_patience == Duration::zero()) return std::nullopt;
+  const std::int64_t received = safety_received_ns_.load();
+  if (received == kNever) return "nothing was heard on ircp/safety, which is asked for";
+  const Duration age = clock_.Steady() - Duration(received);
+  if (age <= options_.safety_patience) return std::nullopt;
+  return "the last sample on ircp/safety is " + FormatFixed(ToSeconds(age), 2) + " s old, " +
+         FormatFixed(ToSeconds(options_.safety_patience), 2) + " s allowed";
+}
+
+std::optional<std::string> Executor::Silence() const {
+  const std::optional<Duration> age = StateAge();
+  if (age && *age <= options_.planner.state_patience) return SafetySilence();
+  const std::string problem = view_.problem();
+  return "the robot's last usable joint state is " + FormatFixed(age ? ToSeconds(*age) : 0, 2) +
+         " s old" + (problem.empty() ? "" : ": " + problem);
 }
 
 ExecutorFigures Executor::figures() const {
@@ -253,6 +274,11 @@ ExecutorFigures Executor::figures() const {
 
 std::vector<ircp::TopicCount> Executor::sent() const {
   return {{ircp::JointCommandSample::kTopic, kProgram, commands_->sent()}};
+}
+
+std::uint64_t Executor::CommandsSent() const {
+  commands_->Flush();
+  return commands_->sent();
 }
 
 std::vector<ircp::TopicReader> Executor::readers() const {
@@ -295,6 +321,7 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
     if (closing_) return Unavailable("the executor is shutting down");
     if (!run_over_) return Refused(state_.load(), Event::kPlan, holder_);
   }
+  if (const std::optional<std::string> silence = SafetySilence()) return Unavailable(*silence);
   Status begun = Apply(Event::kPlan, "planning \"" + request.skill + "\"");
   if (!begun.ok()) return begun;
   const std::lock_guard lock(mutex_);
@@ -302,98 +329,16 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
   return {};
 }
 
-Result<Eigen::VectorXd> Executor::StartJoints() const {
-  const std::optional<Duration> age = StateAge();
-  const std::optional<MeasuredState> measured = view_.latest();
-  const std::string problem = view_.problem();
-  const std::string why = problem.empty() ? "" : ": " + problem;
-  if (!age || !measured) {
-    return Unavailable("nothing usable was heard from the robot on ircp/joint_state" + why);
-  }
-  if (*age > options_.state_patience) {
-    return Unavailable("the robot's last usable joint state is " + FormatFixed(ToSeconds(*age), 2) +
-                       " s old, " + FormatFixed(ToSeconds(options_.state_patience), 2) +
-                       " s allowed" + why);
-  }
-  const std::lock_guard lock(mutex_);
-  if (last_command_ &&
-      (*last_command_ - measured->joints).cwiseAbs().maxCoeff() <= options_.start_tolerance_rad) {
-    return *last_command_;
-  }
-  return measured->joints;
-}
-
-Result<std::vector<geometry::NamedPose>> Executor::ObjectsFor(const api::ExecuteRequest& request) {
-  if (!request.objects.empty()) return request.objects;
-  const Result<learning::SkillReport> skill = skills_.Show(request.skill, request.version);
-  if (!skill.ok()) return skill.error();
-  std::vector<geometry::NamedPose> objects;
-  std::string seen_names;
-  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) {
-    seen_names += (seen_names.empty() ? "" : ", ") + seen.pose.name + " (" +
-                  FormatFixed(seen.age_s, 1) + " s ago)";
-    if (seen.age_s > ToSeconds(options_.object_patience)) continue;
-    if (!skill->target.empty() && seen.pose.name != skill->target) continue;
-    objects.push_back(seen.pose);
-  }
-  if (objects.empty()) {
-    return FailedPrecondition("object \"" + skill->target +
-                                  "\" was not seen on ircp/objects in the last " +
-                                  FormatFixed(ToSeconds(options_.object_patience), 1) +
-                                  " s; seen: " + (seen_names.empty() ? "nothing" : seen_names),
-                              "objects");
-  }
-  return objects;
-}
-
-Result<Executor::Planned> Executor::TryPlan(const api::ExecuteRequest& request,
-                                            std::stop_token stop) {
-  Result<Eigen::VectorXd> start = StartJoints();
-  if (!start.ok()) return start.error();
-  Result<std::vector<geometry::NamedPose>> objects = ObjectsFor(request);
-  if (!objects.ok()) return objects.error();
-
-  demonstration::SkillQuery query;
-  query.objects = *objects;
-  if (request.start) {
-    query.start = request.start;
-  } else {
-    query.start = robot_.chain.ToolPose(*start);
-    query.joint_start_names = robot_.chain.joint_names();
-    query.joint_start = *start;
-  }
-  Result<demonstration::SkillMotion> motion = skills_.Query(request.skill, request.version, query);
-  if (!motion.ok()) return motion.error();
-
-  // What is seen stands where it is seen, but what was asked for stands where it was asked for.
-  std::vector<geometry::NamedPose> placed;
-  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) placed.push_back(seen.pose);
-  const std::vector<geometry::NamedPose>& used =
-      motion->objects.empty() ? *objects : motion->objects;
-  placed.insert(placed.end(), used.begin(), used.end());
-  Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
-      robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
-  if (!checker.ok()) return checker.error();
-  motion::PlanOptions options = options_.plan;
-  options.speed_scale = request.speed;
-  Result<motion::PlannedMotion> planned = motion::PlanMotion(
-      *motion, robot_.model, robot_.chain, *checker, *start, options, std::move(stop));
-  if (!planned.ok()) return planned.error();
-
-  Planned out{*std::move(planned), *std::move(checker), used, motion->warnings, motion->frames()};
-  out.warnings.insert(out.warnings.end(), out.motion.report.warnings.begin(),
-                      out.motion.report.warnings.end());
-  return out;
-}
-
-Result<Executor::Planned> Executor::MakePlan(const api::ExecuteRequest& request) {
+Result<Planned> Executor::MakePlan(const api::ExecuteRequest& request) {
   std::stop_token stop;
+  std::optional<Eigen::VectorXd> last_command;
   {
     const std::lock_guard lock(mutex_);
     planning_stop_ = std::stop_source();
     stop = planning_stop_.get_token();
+    last_command = last_command_;
   }
-  Result<Planned> planned = TryPlan(request, stop);
+  Result<Planned> planned = planner_.Plan(request, last_command, stop);
   if (!planned.ok()) {
     plans_refused_.fetch_add(1, std::memory_order_relaxed);
     (void)Apply(Event::kRefused, "refused: " + planned.error().message);
@@ -407,23 +352,6 @@ Result<Executor::Planned> Executor::MakePlan(const api::ExecuteRequest& request)
   return planned;
 }
 
-api::PlanSummary Executor::Summarise(const Planned& planned) const {
-  const motion::PlanReport& report = planned.motion.report;
-  api::PlanSummary summary;
-  summary.duration_s = planned.motion.trajectory.duration_s();
-  summary.frames = planned.frames;
-  summary.max_position_error_m = report.max_position_error_m;
-  summary.max_contact_error_m = report.max_contact_error_m;
-  summary.clearance_m = report.smallest_clearance.distance_m;
-  if (!report.smallest_clearance.first.empty()) {
-    summary.clearance_between =
-        report.smallest_clearance.first + " and " + report.smallest_clearance.second;
-  }
-  summary.time_stretch = report.time_stretch;
-  summary.warnings = planned.warnings;
-  return summary;
-}
-
 Result<api::PlanSummary> Executor::Plan(const api::ExecuteRequest& request) {
   const Status begun = Begin(request);
   if (!begun.ok()) return begun.error();
@@ -433,17 +361,6 @@ Result<api::PlanSummary> Executor::Plan(const api::ExecuteRequest& request) {
 }
 
 // ---------------------------------------------------------------- execution
-
-Status Executor::CheckStillThere(const motion::PlannedMotion& plan) const {
-  const std::optional<MeasuredState> measured = view_.latest();
-  const Eigen::VectorXd first = plan.trajectory.positions.row(0).transpose();
-  int joint = 0;
-  const double off = (measured->joints - first).cwiseAbs().maxCoeff(&joint);
-  if (off <= options_.start_tolerance_rad) return {};
-  return FailedPrecondition("the robot has moved since it was planned: joint \"" +
-                            robot_.chain.joint_names()[joint] + "\" is " + FormatFixed(off, 3) +
-                            " rad away from the motion's start");
-}
 
 Result<api::ExecutionResult> Executor::Execute(
     const api::ExecuteRequest& request,
@@ -458,14 +375,20 @@ Result<api::ExecutionResult> Executor::Execute(
   api::ExecutionResult result;
   result.plan = Summarise(*planned);
   result.objects = planned->objects;
-  const Status there = CheckStillThere(planned->motion);
+  const Status there = planner_.CheckStart(planned->motion);
   if (!there.ok()) {
     (void)Apply(Event::kReset, there.error().message);
     return there.error();
   }
   const std::uint64_t sent_before = commands_->sent();
-  const auto run = std::make_shared<MotionRun>(robot_, std::move(planned->motion),
-                                               std::move(planned->checker), options_.watch);
+  const auto run =
+      std::make_shared<MotionRun>(robot_, std::move(planned->motion), std::move(planned->checker),
+                                  options_.watch, std::move(planned->zones));
+  {
+    const std::lock_guard lock(mutex_);
+    fixed_ = planned->objects;
+    placed_ = std::move(planned->placed);
+  }
   const Status started = Apply(Event::kStart, "executing \"" + request.skill + "\"", run);
   if (!started.ok()) return started.error();
 
@@ -512,14 +435,26 @@ void Executor::ControlLoop(const std::stop_token& stop) {
     }
     if (!RunMotion(*run, stop)) return;
     commands_->Flush();  // so that the status that follows counts every command
-    // Refused where a stop came first: then the motion ended by that.
-    (void)Apply(Event::kFinish, "the end of the motion is reached");
+    EndMotion(*run);
     {
       const std::lock_guard lock(mutex_);
       run_over_ = true;
       last_command_ = run->commanded();
     }
     changed_.notify_all();
+  }
+}
+
+void Executor::EndMotion(MotionRun& run) {
+  // Refused where a stop came first: then the motion ended by that.
+  if (const std::optional<std::string> away = run.not_arrived(); away && IsMoving(state_.load())) {
+    (void)Apply(Event::kFault, *away);
+  } else if (const std::optional<std::string> object = run.missed()) {
+    (void)Apply(Event::kMiss, "no touch: \"" + *object + "\" was not felt within " +
+                                  FormatFixed(1000 * options_.planner.guard.distance_m, 0) +
+                                  " mm past the place where it was expected");
+  } else {
+    (void)Apply(Event::kFinish, "the end of the motion is reached");
   }
 }
 
@@ -540,10 +475,9 @@ bool Executor::RunMotion(MotionRun& run, const std::stop_token& stop) {
     deadline += period;
     commands_->Put(run.Tick(elapsed_s, state_.load(), speed_.load(std::memory_order_relaxed)));
 
-    const std::optional<Duration> age = StateAge();
-    if (IsMoving(state_.load()) && (!age || *age > options_.state_patience)) {
-      (void)Apply(Event::kFault, "the robot's last joint state is " +
-                                     FormatFixed(age ? ToSeconds(*age) : 0, 2) + " s old");
+    if (IsMoving(state_.load())) {
+      const std::optional<std::string> silence = Silence();
+      if (silence) (void)Apply(Event::kFault, *silence);
     }
     since_beat_s += elapsed_s;
     if (since_beat_s >= kBeat_s) {
@@ -569,12 +503,18 @@ void Executor::CountCycle(Duration lateness) {
 void Executor::WatchLoop(const std::stop_token& stop) {
   while (true) {
     std::shared_ptr<MotionRun> run;
+    std::optional<collision::Scene> moved;
     {
       std::unique_lock lock(mutex_);
       if (!changed_.wait(lock, stop, [this] { return run_ != nullptr && run_->has_unwatched(); })) {
         return;
       }
       run = run_;
+      moved = planner_.MovedScene(fixed_, placed_);
+    }
+    if (moved) {
+      const Status set = run->SetScene(*std::move(moved));
+      if (!set.ok()) log_.Warning("an object's place is not used", {{"why", set.error().message}});
     }
     const std::optional<std::string> wrong = run->Watch();
     if (wrong && IsMoving(state_.load())) (void)Apply(Event::kFault, *wrong);

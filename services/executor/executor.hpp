@@ -15,6 +15,7 @@
 
 #include "executor/command_stream.hpp"
 #include "executor/motion_run.hpp"
+#include "executor/planner.hpp"
 #include "executor/robot_view.hpp"
 #include "executor/state_machine.hpp"
 #include "exemplar/api/services.hpp"
@@ -24,7 +25,6 @@
 #include "exemplar/ircp/control.hpp"
 #include "exemplar/ircp/metrics.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
-#include "exemplar/motion/plan.hpp"
 #include "exemplar/scene/description.hpp"
 
 namespace exemplar::executor {
@@ -33,15 +33,10 @@ struct ExecutorOptions {
   double rate_hz = 125;
   /// The threads that make and write commands go before ordinary ones, where this is permitted.
   bool realtime = false;
-  /// Older joint states count as none: planning is refused, a motion is stopped.
-  Duration state_patience = std::chrono::milliseconds(250);
-  /// Objects seen longer ago are not used unless they are asked for with their pose.
-  Duration object_patience = std::chrono::seconds(2);
-  /// The motion begins at the last commanded posture where the robot is this near to it, else at
-  /// the measured one; and is refused where it has moved further than this while it was planned.
-  double start_tolerance_rad = 0.05;
-  WatchLimits watch = {};
-  motion::PlanOptions plan = {};  ///< touch links and comfortable posture come from the robot
+  PlannerOptions planner = {};  ///< touch links and comfortable posture come from the robot
+  WatchLimits watch = {};       ///< the command period comes from the rate
+  /// Without ircp/safety for so long nothing begins and a motion is stopped; 0: not asked for.
+  Duration safety_patience = Duration::zero();
 };
 
 /// How it goes, since the executor began.
@@ -87,20 +82,14 @@ class Executor final : public api::ExecutorApi {
 
   ExecutorFigures figures() const;
   std::vector<ircp::TopicCount> sent() const;
+  /// Joint commands so far; returns when those on their way have left.
+  std::uint64_t CommandsSent() const;
   std::vector<ircp::TopicReader> readers() const;
 
   /// Brings a motion to rest on its path and returns when it rests; nothing is executed afterwards.
   void Shutdown();
 
  private:
-  struct Planned {
-    motion::PlannedMotion motion;
-    collision::CollisionChecker checker;
-    std::vector<geometry::NamedPose> objects;
-    std::vector<std::string> warnings;
-    int frames = 0;
-  };
-
   Executor(const Clock& clock, Log& log, api::SkillApi& skills,
            const kinematics::RobotDescription& robot, const scene::Description& scene,
            ExecutorOptions options);
@@ -111,16 +100,15 @@ class Executor final : public api::ExecutorApi {
   Status Begin(const api::ExecuteRequest& request);
   /// Asks for the motion and plans it; leaves kReady, or goes back to kIdle where there is none.
   Result<Planned> MakePlan(const api::ExecuteRequest& request);
-  Result<Planned> TryPlan(const api::ExecuteRequest& request, std::stop_token stop);
-  Result<Eigen::VectorXd> StartJoints() const;
-  Result<std::vector<geometry::NamedPose>> ObjectsFor(const api::ExecuteRequest& request);
-  Status CheckStillThere(const motion::PlannedMotion& plan) const;
-  api::PlanSummary Summarise(const Planned& planned) const;
 
   void OnJointState(const ircp::JointStateSample& sample);
   void OnSafety(const ircp::SafetySample& sample);
   ircp::Answer OnCommand(const ircp::CommandSample& command);
   std::optional<Duration> StateAge() const;
+  /// What is wrong now that no joint state would show.
+  std::optional<std::string> Silence() const;
+  std::optional<std::string> SafetySilence() const;
+  void EndMotion(MotionRun& run);
 
   void ControlLoop(const std::stop_token& stop);
   /// False when `stop` came first.
@@ -132,12 +120,12 @@ class Executor final : public api::ExecutorApi {
 
   const Clock& clock_;
   Log& log_;
-  api::SkillApi& skills_;
   const kinematics::RobotDescription& robot_;
-  const scene::Description& scene_;
   const ExecutorOptions options_;
   RobotView view_;
+  const Planner planner_;
   std::atomic<std::int64_t> state_received_ns_;
+  std::atomic<std::int64_t> safety_received_ns_;
   std::atomic<double> speed_{1.0};
   std::atomic<State> state_{State::kIdle};  ///< written under mutex_
   std::atomic<std::uint64_t> plans_refused_{0};
@@ -150,9 +138,11 @@ class Executor final : public api::ExecutorApi {
   std::string detail_;
   std::string holder_;  ///< the request that planning or motion belongs to
   std::stop_source planning_stop_;
-  std::shared_ptr<MotionRun> run_;  ///< shared with the threads that run and watch it
-  bool run_over_ = true;            ///< the control loop is through with run_
-  State run_end_ = State::kIdle;    ///< the state that ended its motion, and why
+  std::shared_ptr<MotionRun> run_;           ///< shared with the threads that run and watch it
+  std::vector<geometry::NamedPose> fixed_;   ///< what run_ is about
+  std::vector<geometry::NamedPose> placed_;  ///< where its watch takes everything to be
+  bool run_over_ = true;                     ///< the control loop is through with run_
+  State run_end_ = State::kIdle;             ///< the state that ended its motion, and why
   std::string run_detail_;
   std::uint64_t beats_ = 0;  ///< a tenth of a second of motion each
   std::optional<Eigen::VectorXd> last_command_;

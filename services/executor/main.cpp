@@ -4,6 +4,7 @@
 #include "executor/metrics.hpp"
 #include "executor/realtime.hpp"
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/bus/station_clock.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
@@ -23,49 +24,104 @@ int main(int argc, char** argv) {
       kName, "Executes skills on a robot: inverse kinematics, collision checks, joint commands",
       "exemplar-executor --robot deploy/models/arm7 --scene deploy/config/rail_press.yaml "
       "--learning 127.0.0.1:50051",
-      {.bus = true, .server = true});
+      {.bus = true, .server = true, .clock = true});
   options.Add("--robot", robot_folder, "folder with robot.yaml and the URDF").Required();
   options.Add("--scene", scene_file, "file that says what stands around the robot").Required();
   options.Add("--learning", learning, "HOST:PORT of the learning service").Required();
   options.Add("--rate-hz", settings.rate_hz, "of ircp/joint_command").MinMax(1, 1000);
   options
-      .Add("--clearance-m", settings.plan.required_clearance_m,
+      .Add("--clearance-m", settings.planner.plan.required_clearance_m,
            "room that planned motions keep to everything but what they touch")
       .MinMax(0, 0.5);
   options.Add("--touch-limit-n", settings.watch.touch_n, "force of a touch that stops a motion")
       .MinMax(0.1, 10000);
+  std::vector<std::string> path_tolerance;
+  options.Add(
+      "--path-tolerance", path_tolerance,
+      "how far a joint may be from where it is commanded, in rad or m, and JOINT=NUMBER for "
+      "one joint (default 0.35)");
+  std::vector<std::string> goal_tolerance;
+  options.Add("--goal-tolerance", goal_tolerance,
+              "likewise from the motion's last point once it is reached (default 0.1)");
+  options
+      .Add("--measured-clearance-m", settings.watch.clearance_m,
+           "a motion is stopped where the measured robot comes nearer to anything that it may not "
+           "touch")
+      .MinMax(0, 0.5);
+  double state_patience_s = 0.25;
+  options.Add("--state-patience-s", state_patience_s, "how old ircp/joint_state may be")
+      .MinMax(0.01, 10);
+  double command_patience_s = 0.25;
+  options
+      .Add("--command-patience-s", command_patience_s,
+           "how old the command may be that the robot says it acts on")
+      .MinMax(0.01, 10);
+  double safety_patience_s = 0;
+  options
+      .Add("--safety-patience-s", safety_patience_s,
+           "nothing moves without a sample on ircp/safety that is younger; 0: not asked for")
+      .MinMax(0, 10);
+  options
+      .Add("--guard-touch-n", settings.planner.guard.touch_n,
+           "a press goes on slowly past the expected contact until a touch of this force ends it; "
+           "0: by position alone")
+      .MinMax(0, 1000);
+  options
+      .Add("--guard-distance-m", settings.planner.guard.distance_m,
+           "how far past the expected contact a press looks for touch")
+      .MinMax(0.0005, 0.05);
+  options.Add("--guard-speed-m-s", settings.planner.guard.speed_m_s, "of the tool meanwhile")
+      .MinMax(0.001, 0.2);
   std::string way = "exemplar";
   options.Add("--inverse-kinematics", way, "how joints are made to follow a tool path")
       .OneOf({"exemplar", "plain", "energy", "path"});
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
-  settings.plan.inverse_kinematics = *motion::ParsePathIkVariant(way);
+  settings.planner.state_patience = FromSeconds(state_patience_s);
+  settings.watch.stream.delay_patience = settings.planner.state_patience;
+  settings.watch.stream.command_patience = FromSeconds(command_patience_s);
+  settings.safety_patience = FromSeconds(safety_patience_s);
+  settings.planner.plan.inverse_kinematics = *motion::ParsePathIkVariant(way);
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "executor");
   if (!executor::LockMemory()) {
     log->Info("memory is not locked", {{"advice", "raise the memlock limit to unlimited"}});
   }
-  const SystemClock clock;
   const auto robot = kinematics::ReadRobotDescription(robot_folder);
   if (!robot.ok()) return program::Fail(kName, robot.error());
+  for (const auto& [words, tolerance] : {std::pair{&path_tolerance, &settings.watch.path},
+                                         std::pair{&goal_tolerance, &settings.watch.goal}}) {
+    const auto read =
+        executor::ParseTolerance(*words, robot->chain.joint_names(), tolerance->general);
+    if (!read.ok()) return options.Refuse(read.error().message);
+    *tolerance = *read;
+  }
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene.ok()) return program::Fail(kName, scene.error());
   const auto clients = rpc::Connect({.server = learning, .request_id = "executor"});
   if (!clients.ok()) return program::Fail(kName, clients.error());
-  auto participant =
-      bus::Participant::Create({.domain = options.common().domain,
-                                .station = options.common().station,
-                                .name = kName,
-                                .interfaces = options.common().interfaces,
-                                .peers = options.common().peers,
-                                .discovery_servers = options.common().discovery_servers,
-                                .best_effort_topics = options.common().best_effort,
-                                .clock = &clock,
-                                .log = log.get()});
+  bus::ParticipantOptions network{.domain = options.common().domain,
+                                  .station = options.common().station,
+                                  .name = kName,
+                                  .interfaces = options.common().interfaces,
+                                  .peers = options.common().peers,
+                                  .discovery_servers = options.common().discovery_servers,
+                                  .best_effort_topics = options.common().best_effort,
+                                  .log = log.get()};
+  bus::StationClock station_clock;
+  if (options.common().clock == "network") {
+    auto followed = bus::StationClock::Follow(network, "executor", signals.token());
+    if (!followed.ok()) return program::Fail(kName, followed.error());
+    station_clock = std::move(*followed);
+  }
+  const Clock& clock = *station_clock;
+  network.clock = &clock;
+  auto participant = bus::Participant::Create(network);
   if (!participant.ok()) return program::Fail(kName, participant.error());
   auto app = executor::Executor::Create(**participant, clock, *log, *clients->skills, *robot,
                                         *scene, settings);
   if (!app.ok()) return program::Fail(kName, app.error());
+  station_clock.SetCommandsSent([&app] { return (*app)->CommandsSent(); });
   rpc::CallLog calls(*log);
   auto server = rpc::Server::Create(
       {.listen = options.common().listen,
@@ -84,6 +140,7 @@ int main(int argc, char** argv) {
   signals.Wait();
   (*app)->Shutdown();
   (*server)->Shutdown(std::chrono::seconds(1));
+  station_clock.SetCommandsSent(nullptr);
   log->Info("stopped");
   return 0;
 }

@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "executor/command_stream.hpp"
+#include "executor/guard.hpp"
 #include "executor/lateness.hpp"
 #include "executor/monitor.hpp"
 #include "executor/path_player.hpp"
@@ -23,13 +25,17 @@ inline constexpr double kPauseRamp_s = 0.3;
 inline constexpr double kStopRamp_s = 0.12;
 /// The last posture goes on being commanded for so long, so that the robot arrives in it.
 inline constexpr double kSettle_s = 0.3;
+/// And so much longer at the end of the path, where it has not arrived by then.
+inline constexpr double kArrivalPatience_s = 0.7;
 
 /// Three threads meet here: Tick and AddLateness belong to the control loop, Measure to the
 /// network, Watch and Report to whoever watches. Each is safe beside the others.
 class MotionRun {
  public:
+  /// `zones`: presses that end by touch, in the order of their time.
   MotionRun(const kinematics::RobotDescription& robot, motion::PlannedMotion plan,
-            collision::CollisionChecker checker, const WatchLimits& limits);
+            collision::CollisionChecker checker, const WatchLimits& limits,
+            std::vector<GuardZone> zones = {});
   MotionRun(const MotionRun&) = delete;
   MotionRun& operator=(const MotionRun&) = delete;
 
@@ -42,10 +48,18 @@ class MotionRun {
   double duration_s() const { return plan_.trajectory.duration_s(); }
   Eigen::VectorXd commanded() const;
 
-  void Measure(const MeasuredState& state);
+  /// The object of the first press that met no touch, once it is past. Ends as such.
+  std::optional<std::string> missed() const;
+  /// Whether the robot was measured where the motion ends, or which joint was not.
+  std::optional<std::string> not_arrived() const;
+
+  /// `sent`: commands, of all motions.
+  void Measure(const MeasuredState& state, std::uint64_t sent = 0);
 
   /// Takes what was measured since into the figures; says what is wrong, if anything.
   std::optional<std::string> Watch();
+  /// Objects are elsewhere now; beside Watch on the same thread.
+  Status SetScene(collision::Scene scene) { return monitor_.SetScene(std::move(scene)); }
   bool has_unwatched() const;
   double tracking_error_rad() const { return tracking_rad_.load(std::memory_order_relaxed); }
   double touch_n() const { return touch_n_.load(std::memory_order_relaxed); }
@@ -55,8 +69,22 @@ class MotionRun {
  private:
   static constexpr std::size_t kMaxUnwatched = 1024;
 
+  /// What leads over from the way in to the way out of a press that met its touch, on the plan's
+  /// time from begin_s on: added to the path.
+  struct Splice {
+    double begin_s = 0;
+    double duration_s = 0;  ///< 0: none
+    Eigen::VectorXd offset, slope_per_s;
+  };
+  void FollowGuard(State state);
+  void BeginSplice(double leave_s);
+  void AddSplice();
+
   const motion::PlannedMotion plan_;
+  const std::vector<GuardZone> zones_;
   PathPlayer player_;
+  std::size_t zone_ = 0;  ///< the next one
+  Splice splice_;
   Setpoint setpoint_;
   Eigen::VectorXd position_, velocity_;
   double settled_s_ = 0;
@@ -64,6 +92,9 @@ class MotionRun {
   LatenessHistogram lateness_;
 
   std::atomic<bool> finished_{false};
+  std::atomic<bool> arrived_{true};
+  std::atomic<double> speed_share_{1};
+  std::atomic<int> missed_{-1};
   std::atomic<double> path_time_s_{0};
   std::atomic<double> tracking_rad_{0};
   std::atomic<double> touch_n_{0};
@@ -73,6 +104,7 @@ class MotionRun {
   double commanded_elapsed_s_ = 0;
   std::vector<Measurement> measured_;
   bool watching_ = false;
+  std::optional<std::string> not_arrived_;
 
   Monitor monitor_;  ///< Watch and Report only
 };

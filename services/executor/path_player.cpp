@@ -62,6 +62,11 @@ void PathPlayer::Advance(double elapsed_s, double target_rate, double slope_per_
   time_s_ = std::clamp(ramp_begin_time_s_ + ramp_.Way(ramp_s_), time_s_, trajectory_.duration_s());
 }
 
+void PathPlayer::SkipTo(double time_s) {
+  ramp_begin_time_s_ += time_s - time_s_;
+  time_s_ = time_s;
+}
+
 void PathPlayer::Begin(double target_rate, double slope_per_s) {
   const double shortest = std::max(std::abs(target_rate - rate_) / slope_per_s, kShortestRamp_s);
   const double longest = target_rate == 0 ? std::max(shortest, kLongestStop_s) : kLongestRamp_s;

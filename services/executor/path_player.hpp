@@ -24,6 +24,9 @@ class PathPlayer {
   /// most `slope_per_s` on average.
   void Advance(double elapsed_s, double target_rate, double slope_per_s);
 
+  /// Goes on from another time of the plan at the present rate.
+  void SkipTo(double time_s);
+
   double time_s() const { return time_s_; }  ///< on the plan's time
   double rate() const { return rate_; }
   bool at_end() const { return time_s_ >= trajectory_.duration_s(); }

@@ -9,6 +9,8 @@ std::optional<MeasuredState> RobotView::Take(const ircp::JointStateSample& sampl
                                              Duration steady) {
   MeasuredState state;
   state.received = steady;
+  state.stamp = sample.header.stamp;
+  state.command_seq = sample.command_seq;
   state.joints.resize(static_cast<Eigen::Index>(joint_names_.size()));
   std::string problem;
   for (std::size_t j = 0; j < joint_names_.size() && problem.empty(); ++j) {
@@ -21,7 +23,9 @@ std::optional<MeasuredState> RobotView::Take(const ircp::JointStateSample& sampl
     }
   }
   for (const double touch : sample.touch_n) {
-    if (std::isfinite(touch)) state.touch_n = std::max(state.touch_n, touch);
+    if (!std::isfinite(touch)) continue;
+    state.feels_touch = true;
+    state.touch_n = std::max(state.touch_n, touch);
   }
   const std::lock_guard lock(mutex_);
   problem_ = problem;

@@ -2,6 +2,7 @@
 // What the executor last heard of the robot and of the objects around it.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -16,9 +17,12 @@ namespace exemplar::executor {
 
 /// The robot as measured once.
 struct MeasuredState {
-  Eigen::VectorXd joints;  ///< n = chain.dof(), in the chain's order
-  double touch_n = 0;      ///< the largest of the touch sensors
-  Duration received{0};    ///< steady time
+  Eigen::VectorXd joints;         ///< n = chain.dof(), in the chain's order
+  double touch_n = 0;             ///< the largest of the touch sensors
+  Duration received{0};           ///< steady time
+  Stamp stamp = {};               ///< when it was measured, by the robot's clock
+  std::uint64_t command_seq = 0;  ///< the command that the robot acted on; 0: it does not say
+  bool feels_touch = false;       ///< it has a touch sensor
 };
 
 /// Thread-safe.

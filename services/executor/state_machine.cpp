@@ -52,6 +52,8 @@ std::string_view ToString(Event event) {
       return "reset";
     case Event::kFinish:
       return "finish";
+    case Event::kMiss:
+      return "miss";
   }
   return "unknown";
 }
@@ -83,6 +85,7 @@ std::optional<State> Next(State state, Event event) {
       if (event == Event::kCancel) return State::kAborted;
       if (event == Event::kFault) return State::kProtectiveStop;
       if (event == Event::kFinish) return State::kDone;
+      if (event == Event::kMiss) return State::kAborted;
       return std::nullopt;
     case State::kProtectiveStop:
     case State::kEmergencyStop:

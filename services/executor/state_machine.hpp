@@ -32,15 +32,16 @@ enum class Event {
   kEmergency,
   kReset,
   kFinish,  ///< the end of the motion is reached
+  kMiss,    ///< it is reached, but a press met no touch
 };
 
 inline constexpr std::array kAllStates = {
     State::kIdle,           State::kPlanning,      State::kReady, State::kExecuting, State::kPaused,
     State::kProtectiveStop, State::kEmergencyStop, State::kDone,  State::kAborted};
-inline constexpr std::array kAllEvents = {Event::kPlan,      Event::kPlanned, Event::kRefused,
-                                          Event::kStart,     Event::kPause,   Event::kResume,
-                                          Event::kCancel,    Event::kStop,    Event::kFault,
-                                          Event::kEmergency, Event::kReset,   Event::kFinish};
+inline constexpr std::array kAllEvents = {
+    Event::kPlan,   Event::kPlanned, Event::kRefused, Event::kStart, Event::kPause,
+    Event::kResume, Event::kCancel,  Event::kStop,    Event::kFault, Event::kEmergency,
+    Event::kReset,  Event::kFinish,  Event::kMiss};
 
 /// "executing", "protective_stop", ...
 std::string_view ToString(State state);

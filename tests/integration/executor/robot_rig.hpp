@@ -55,6 +55,7 @@ class PressSkill final : public api::SkillApi {
     if (error) return *error;
     if (name != "press") return NotFound("no skill \"" + name + "\"", "skill");
     last_query = query;
+    if (on_query) on_query();
     demonstration::SkillMotion motion;
     motion.skill = name;
     motion.objects = query.objects;
@@ -81,6 +82,7 @@ class PressSkill final : public api::SkillApi {
   }
 
   std::optional<Error> error;
+  std::function<void()> on_query;
   std::optional<demonstration::SkillQuery> last_query;
 
  private:
@@ -93,7 +95,7 @@ class PressSkill final : public api::SkillApi {
 /// The rig of most tests. Time moves only in Step.
 class RobotRig : public ::testing::Test {
  protected:
-  RobotRig()
+  explicit RobotRig(const ExecutorOptions& options = {})
       : robot_(*kinematics::ReadRobotDescription(std::filesystem::path(EXEMPLAR_SOURCE_DIR) /
                                                  "deploy" / "models" / "arm7")) {
     measured_ = robot_.home;
@@ -103,7 +105,12 @@ class RobotRig : public ::testing::Test {
     button.name = "target";
     button.base_T_object.translation = {0.4, 0.3, 0.04};
     scene_.buttons.push_back(button);
-    executor_ = *Executor::Create(bus_, clock_, log_, skills_, robot_, scene_, ExecutorOptions{});
+    button.name = "block";
+    button.base_T_object.translation = {-0.5, 0.5, 0.1};
+    button.radius_m = 0.03;
+    button.height_m = 0.1;
+    scene_.buttons.push_back(button);
+    executor_ = *Executor::Create(bus_, clock_, log_, skills_, robot_, scene_, options);
     state_writer_ = *bus_.MakeWriter<ircp::JointStateSample>("robot");
     object_writer_ = *bus_.MakeWriter<ircp::ObjectSample>("vision");
     safety_writer_ = *bus_.MakeWriter<ircp::SafetySample>("panel");
@@ -128,12 +135,17 @@ class RobotRig : public ::testing::Test {
     sample.positions.assign(measured_.data(), measured_.data() + measured_.size());
     sample.touch_sensors = {"finger"};
     sample.touch_n = {touch_n_};
+    if (state_delay_ > Duration::zero()) sample.header.stamp = clock_.Now() - state_delay_;
+    if (command_lag_) {
+      const std::lock_guard lock(mutex_);
+      sample.command_seq = commands_ > *command_lag_ ? commands_ - *command_lag_ : 1;
+    }
     ASSERT_TRUE(state_writer_->Write(sample).ok());
   }
 
-  void See(const Eigen::Vector3d& position) {
+  void See(const Eigen::Vector3d& position, const std::string& name = "target") {
     ircp::ObjectSample sample;
-    sample.name = "target";
+    sample.name = name;
     sample.frame = "base";
     sample.base_T_object.translation = position;
     ASSERT_TRUE(object_writer_->Write(sample).ok());
@@ -179,6 +191,8 @@ class RobotRig : public ::testing::Test {
       if (follows_ && commanded_.size() > 0) {
         measured_ = commanded_;
         measured_[1] += lag_rad_;
+      } else if (!frozen_) {
+        measured_[0] += 1e-7;  // no sensor stands quite still
       }
     }
     if (speaks_) PublishState();
@@ -230,6 +244,9 @@ class RobotRig : public ::testing::Test {
   double touch_n_ = 0;
   double lag_rad_ = 0;
   bool follows_ = true;
+  bool frozen_ = false;
+  Duration state_delay_{0};
+  std::optional<std::uint64_t> command_lag_;  ///< in commands; absent: the robot does not say
   bool speaks_ = true;
 
   std::mutex mutex_;

@@ -1,0 +1,189 @@
+#include "executor/planner.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "exemplar/base/text.hpp"
+
+namespace exemplar::executor {
+
+api::PlanSummary Summarise(const Planned& planned) {
+  const motion::PlanReport& report = planned.motion.report;
+  api::PlanSummary summary;
+  summary.duration_s = planned.motion.trajectory.duration_s();
+  summary.frames = planned.frames;
+  summary.max_position_error_m = report.max_position_error_m;
+  summary.max_contact_error_m = report.max_contact_error_m;
+  summary.clearance_m = report.smallest_clearance.distance_m;
+  if (!report.smallest_clearance.first.empty()) {
+    summary.clearance_between =
+        report.smallest_clearance.first + " and " + report.smallest_clearance.second;
+  }
+  summary.time_stretch = report.time_stretch;
+  summary.warnings = planned.warnings;
+  return summary;
+}
+
+Planner::Planner(const Clock& clock, api::SkillApi& skills,
+                 const kinematics::RobotDescription& robot, const scene::Description& scene,
+                 const RobotView& view, PlannerOptions options)
+    : clock_(clock),
+      skills_(skills),
+      robot_(robot),
+      scene_(scene),
+      view_(view),
+      options_(std::move(options)) {}
+
+Result<MeasuredState> Planner::FreshState() const {
+  const std::optional<MeasuredState> measured = view_.latest();
+  const std::string problem = view_.problem();
+  const std::string why = problem.empty() ? "" : ": " + problem;
+  if (!measured) {
+    return Unavailable("nothing usable was heard from the robot on ircp/joint_state" + why);
+  }
+  const Duration age = clock_.Steady() - measured->received;
+  if (age > options_.state_patience) {
+    return Unavailable("the robot's last usable joint state is " + FormatFixed(ToSeconds(age), 2) +
+                       " s old, " + FormatFixed(ToSeconds(options_.state_patience), 2) +
+                       " s allowed" + why);
+  }
+  return *measured;
+}
+
+Result<std::vector<geometry::NamedPose>> Planner::ObjectsFor(
+    const api::ExecuteRequest& request) const {
+  if (!request.objects.empty()) return request.objects;
+  const Result<learning::SkillReport> skill = skills_.Show(request.skill, request.version);
+  if (!skill.ok()) return skill.error();
+  std::vector<geometry::NamedPose> objects;
+  std::string seen_names;
+  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) {
+    seen_names += (seen_names.empty() ? "" : ", ") + seen.pose.name + " (" +
+                  FormatFixed(seen.age_s, 1) + " s ago)";
+    if (seen.age_s > ToSeconds(options_.object_patience)) continue;
+    if (!skill->target.empty() && seen.pose.name != skill->target) continue;
+    objects.push_back(seen.pose);
+  }
+  if (objects.empty()) {
+    return FailedPrecondition("object \"" + skill->target +
+                                  "\" was not seen on ircp/objects in the last " +
+                                  FormatFixed(ToSeconds(options_.object_patience), 1) +
+                                  " s; seen: " + (seen_names.empty() ? "nothing" : seen_names),
+                              "objects");
+  }
+  return objects;
+}
+
+Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
+                              const std::optional<Eigen::VectorXd>& last_command,
+                              std::stop_token stop) const {
+  const Result<MeasuredState> measured = FreshState();
+  if (!measured.ok()) return measured.error();
+  Eigen::VectorXd start = measured->joints;
+  if (last_command &&
+      (*last_command - start).cwiseAbs().maxCoeff() <= options_.start_tolerance_rad) {
+    start = *last_command;
+  }
+  Result<std::vector<geometry::NamedPose>> objects = ObjectsFor(request);
+  if (!objects.ok()) return objects.error();
+
+  demonstration::SkillQuery query;
+  query.objects = *objects;
+  if (request.start) {
+    query.start = request.start;
+  } else {
+    query.start = robot_.chain.ToolPose(start);
+    query.joint_start_names = robot_.chain.joint_names();
+    query.joint_start = start;
+  }
+  Result<demonstration::SkillMotion> motion = skills_.Query(request.skill, request.version, query);
+  if (!motion.ok()) return motion.error();
+
+  // What is seen stands where it is seen, but what was asked for stands where it was asked for.
+  std::vector<geometry::NamedPose> placed;
+  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) placed.push_back(seen.pose);
+  const std::vector<geometry::NamedPose>& used =
+      motion->objects.empty() ? *objects : motion->objects;
+  placed.insert(placed.end(), used.begin(), used.end());
+  Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
+      robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
+  if (!checker.ok()) return checker.error();
+  Result<Planned> planned =
+      PlanGuarded(*motion, *std::move(checker), *measured, start, request.speed, stop);
+  if (!planned.ok()) return planned;
+  planned->objects = used;
+  planned->placed = std::move(placed);
+  return planned;
+}
+
+Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
+                                     collision::CollisionChecker checker,
+                                     const MeasuredState& measured, const Eigen::VectorXd& start,
+                                     double speed, const std::stop_token& stop) const {
+  motion::PlanOptions options = options_.plan;
+  options.speed_scale = speed;
+  std::vector<std::string> warnings = motion.warnings;
+  std::vector<GuardZone> zones;
+  Result<motion::PlannedMotion> planned = FailedPrecondition("not planned");
+  std::optional<demonstration::SkillMotion> guarded;
+  if (options_.guard.touch_n > 0 && measured.feels_touch) {
+    guarded = WithGuard(motion, options_.guard);
+  }
+  if (guarded) {
+    planned =
+        motion::PlanMotion(*guarded, robot_.model, robot_.chain, checker, start, options, stop);
+    if (planned.ok()) {
+      zones = GuardZones(*planned, motion, robot_.chain, scene_, options_.guard);
+    } else {
+      warnings.push_back("pressed by position, not until touch: " + planned.error().message);
+    }
+  }
+  if (!planned.ok()) {
+    planned = motion::PlanMotion(motion, robot_.model, robot_.chain, checker, start, options, stop);
+  }
+  if (!planned.ok()) return planned.error();
+  const std::vector<std::string>& more = planned->report.warnings;
+  warnings.insert(warnings.end(), more.begin(), more.end());
+  return Planned{*std::move(planned), std::move(checker), {}, {}, std::move(zones),
+                 std::move(warnings), motion.frames()};
+}
+
+std::optional<collision::Scene> Planner::MovedScene(
+    const std::vector<geometry::NamedPose>& fixed, std::vector<geometry::NamedPose>& placed) const {
+  const auto named = [](const std::string& name) {
+    return [&name](const geometry::NamedPose& pose) { return pose.name == name; };
+  };
+  bool moved = false;
+  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) {
+    const geometry::NamedPose& now = seen.pose;
+    if (std::any_of(fixed.begin(), fixed.end(), named(now.name))) continue;
+    const auto before = std::find_if(placed.begin(), placed.end(), named(now.name));
+    if (before == placed.end()) {
+      placed.insert(placed.begin(), now);
+      moved = true;
+      continue;
+    }
+    const geometry::Pose& was = before->base_T_object;
+    const double far = (now.base_T_object.translation - was.translation).norm();
+    const double turned = geometry::AngleBetween(now.base_T_object.rotation, was.rotation);
+    if (far <= options_.moved_m && !(now.has_orientation && turned > options_.moved_rad)) continue;
+    *before = now;
+    moved = true;
+  }
+  if (!moved) return std::nullopt;
+  return collision::MakeScene(scene_, placed);
+}
+
+Status Planner::CheckStart(const motion::PlannedMotion& plan) const {
+  const Result<MeasuredState> measured = FreshState();
+  if (!measured.ok()) return measured.error();
+  const Eigen::VectorXd first = plan.trajectory.positions.row(0).transpose();
+  int joint = 0;
+  const double off = (measured->joints - first).cwiseAbs().maxCoeff(&joint);
+  if (off <= options_.start_tolerance_rad) return {};
+  return FailedPrecondition("the robot has moved since it was planned: joint \"" +
+                            robot_.chain.joint_names()[joint] + "\" is " + FormatFixed(off, 3) +
+                            " rad away from the motion's start");
+}
+
+}  // namespace exemplar::executor

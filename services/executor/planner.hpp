@@ -1,0 +1,85 @@
+#pragma once
+// From a request to a checked motion: asks the skill, places what is seen, plans.
+
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "executor/guard.hpp"
+#include "executor/robot_view.hpp"
+#include "exemplar/api/services.hpp"
+#include "exemplar/base/clock.hpp"
+#include "exemplar/collision/scene.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/motion/plan.hpp"
+#include "exemplar/scene/description.hpp"
+
+namespace exemplar::executor {
+
+struct PlannerOptions {
+  /// Older joint states count as none.
+  Duration state_patience = std::chrono::milliseconds(250);
+  /// Objects seen longer ago are not used unless they are asked for with their pose.
+  Duration object_patience = std::chrono::seconds(2);
+  /// The motion begins at the last commanded posture where the robot is this near to it, else at
+  /// the measured one; and is refused where it has moved further than this while it was planned.
+  double start_tolerance_rad = 0.05;
+  motion::PlanOptions plan = {};
+  GuardOptions guard = {};
+  /// An object that is seen further than this from where it was taken to be has moved.
+  double moved_m = 0.005;
+  double moved_rad = 0.05;
+};
+
+struct Planned {
+  motion::PlannedMotion motion;
+  collision::CollisionChecker checker;
+  std::vector<geometry::NamedPose> objects;  ///< what the skill was asked for
+  std::vector<geometry::NamedPose> placed;   ///< where everything was taken to be, those last
+  std::vector<GuardZone> zones;
+  std::vector<std::string> warnings;
+  int frames = 0;
+};
+
+api::PlanSummary Summarise(const Planned& planned);
+
+/// Thread-safe.
+class Planner {
+ public:
+  /// The arguments by reference outlive the planner.
+  Planner(const Clock& clock, api::SkillApi& skills, const kinematics::RobotDescription& robot,
+          const scene::Description& scene, const RobotView& view, PlannerOptions options);
+
+  /// `last_command`: where the robot was told to be, where it was told anything.
+  Result<Planned> Plan(const api::ExecuteRequest& request,
+                       const std::optional<Eigen::VectorXd>& last_command,
+                       std::stop_token stop) const;
+
+  /// Refuses a motion whose first point the robot is not near, or of which nobody knows.
+  Status CheckStart(const motion::PlannedMotion& plan) const;
+
+  /// The scene as it is seen now, where something but `fixed` moved away from `placed`, which is
+  /// brought up to date.
+  std::optional<collision::Scene> MovedScene(const std::vector<geometry::NamedPose>& fixed,
+                                             std::vector<geometry::NamedPose>& placed) const;
+
+ private:
+  /// The last usable joint state, if it is fresh.
+  Result<MeasuredState> FreshState() const;
+  /// Guarded where there is a press, a touch sensor and room for it.
+  Result<Planned> PlanGuarded(const demonstration::SkillMotion& motion,
+                              collision::CollisionChecker checker, const MeasuredState& measured,
+                              const Eigen::VectorXd& start, double speed,
+                              const std::stop_token& stop) const;
+  Result<std::vector<geometry::NamedPose>> ObjectsFor(const api::ExecuteRequest& request) const;
+
+  const Clock& clock_;
+  api::SkillApi& skills_;
+  const kinematics::RobotDescription& robot_;
+  const scene::Description& scene_;
+  const RobotView& view_;
+  const PlannerOptions options_;
+};
+
+}  // namespace exemplar::executor
