@@ -253,13 +253,13 @@ TEST(TrajectoryPath, TravelIsNeverLessThanTheWayMade) {
 
 TEST(BandedMatrix, SolvesLikeADenseSolver) {
   Rng rng(7);
-  for (const int band : {0, 1, 4, 11}) {
-    const int size = 12;
+  for (const int band : {0, 1, 4, 11, 27, 40}) {
+    const int size = 41;
     Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size, size);
     BandedMatrix banded(size, band);
     for (int j = 0; j < size; ++j) {
       for (int i = j; i < std::min(size, j + band + 1); ++i) {
-        const double value = i == j ? 20.0 : rng.Normal();
+        const double value = i == j ? 60.0 : rng.Normal();
         dense(i, j) = value;
         dense(j, i) = value;
         banded(i, j) = value;
