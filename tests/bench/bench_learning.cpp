@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -19,6 +20,7 @@
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "long_presses.hpp"
+#include "pair_correlator.hpp"
 #include "subsets.hpp"
 
 namespace exemplar {
@@ -154,10 +156,52 @@ double ExhaustJointly(const Case& c) {
   return best;
 }
 
-void ChooseMarkers(nlohmann::json& rows) {
+// What a correlation costs by itself, at each point of the grid: 24 multiply-adds for either signal
+// (its time, its place between knots, the spline, the value between samples), 7 for Pearson's r.
+constexpr double kNaiveMultiplyAdds = 55;
+// The same in PairCorrelator.
+constexpr double kMultiplyAdds = 16;
+
+struct Work {
+  double points = 0;
+  double naive_points = 0;
+};
+
+Work CountWork(const Case& c) {
+  Work work;
+  const std::vector<learning::CorrelatedTrial> correlated(c.trials.begin(), c.trials.end());
+  const auto all = [&](std::size_t i) {
+    std::vector<int> candidates(c.trials[i].time_s.size());
+    std::iota(candidates.begin(), candidates.end(), 0);
+    return candidates;
+  };
+  for (std::size_t i = 0; i < c.trials.size(); ++i) {
+    for (std::size_t j = i + 1; j < c.trials.size(); ++j) {
+      const auto pairs = static_cast<double>(c.subsets[i].size() * c.subsets[j].size());
+      learning::PairCorrelator pair(correlated[i], correlated[j], kPoints, pairs);
+      pair.CorrelateAll(all(i), all(j), c.subsets[0][0].size(),
+                        [](std::size_t, std::size_t, double) {});
+      work.points += static_cast<double>(pair.computed_points());
+      work.naive_points += pairs * kPoints;
+    }
+  }
+  return work;
+}
+
+void ChooseJointly(bool largest, nlohmann::json& rows) {
   Rng rng(5);
-  {
-    const Case c = MakeCase(rng, 12, 4, 2);  // the last trial has one subset, eleven have six each
+  struct Size {
+    int trials;
+    std::size_t candidates, least;
+    const char* name;
+    bool asked_for_only;
+  };
+  // The last trial has one subset, each other all.
+  for (const Size& size : {Size{12, 4, 2, "joint_choice_exhausted", false},
+                           Size{7, 20, 1, "joint_choice_of_20^6", false},
+                           Size{8, 20, 1, "joint_choice_of_20^7", true}}) {
+    const Case c = MakeCase(rng, size.trials, size.candidates, size.least);
+    if (size.asked_for_only && !largest) continue;
     learning::MarkerChoice choice;
     double best = 0;
     const double joint = Seconds([&] { choice = learning::ChooseJointly(c.trials); });
@@ -165,8 +209,8 @@ void ChooseMarkers(nlohmann::json& rows) {
     if (std::abs(best - choice.value) > 1e-8) {
       std::fprintf(stderr, "%s: the joint choice is not the exhausted one\n", kName);
     }
-    rows.push_back(Row("joint_choice_exhausted", joint, "s", "exhausting 6^11 choices", exhausted,
-                       exhausted / joint));
+    rows.push_back(
+        Row(size.name, joint, "s", "exhausting the choices", exhausted, exhausted / joint));
   }
   for (const std::size_t least : {std::size_t{2}, std::size_t{5}, std::size_t{15}}) {
     const Case c = [&] {
@@ -174,12 +218,15 @@ void ChooseMarkers(nlohmann::json& rows) {
       for (int i = 0; i < 12; ++i) made.trials.push_back(RandomTrial(rng, i, i == 11 ? least : 30));
       return made;
     }();
-    learning::MarkerChoice choice;
-    const double joint = Seconds([&] { choice = learning::ChooseJointly(c.trials); });
+    const double joint = Seconds([&] { learning::ChooseJointly(c.trials); });
     const double vote = Seconds([&] { learning::ChooseByVote(c.trials); });
     rows.push_back(Row("joint_choice_12_trials_30_candidates_" + std::to_string(least) + "_chosen",
                        joint, "s", "the vote on the same candidates", vote, vote / joint));
   }
+}
+
+void ChooseByVote(nlohmann::json& rows) {
+  Rng rng(6);
   for (const auto& [least, candidates] :
        {std::pair<std::size_t, std::size_t>{1, 24}, {2, 12}, {3, 9}, {4, 8}, {6, 9}}) {
     const Case c = MakeCase(rng, 4, candidates, least);
@@ -197,8 +244,13 @@ void ChooseMarkers(nlohmann::json& rows) {
       }
       if (!(sum < 1e300)) std::fprintf(stderr, "%s: no sum\n", kName);
     });
-    rows.push_back(Row("vote_" + std::to_string(least) + "_of_" + std::to_string(candidates), vote,
-                       "s", "each correlation by itself", naive, naive / vote));
+    const std::string name = "vote_" + std::to_string(least) + "_of_" + std::to_string(candidates);
+    rows.push_back(Row(name, vote, "s", "each correlation by itself", naive, naive / vote));
+    const Work work = CountWork(c);
+    const double own = kMultiplyAdds * work.points;
+    const double by_itself = kNaiveMultiplyAdds * work.naive_points;
+    rows.push_back(Row(name + "_multiply_adds", own / 1e6, "million", "each correlation by itself",
+                       by_itself / 1e6, by_itself / own));
   }
 }
 
@@ -209,11 +261,13 @@ int main(int argc, char** argv) {
   using namespace exemplar;
   std::string robot_folder, folder;
   int count = 100;
+  bool largest = false;
   program::Options options(kName, "Measures learning and the choice of markers",
                            "bench_learning --robot deploy/models/leonardo", {});
   options.Add("--robot", robot_folder, "a folder of deploy/models").Required();
   options.Add("--write", folder, "write the trials as CSV files here, and end");
   options.Add("--trials", count, "how many").MinMax(1, 10000);
+  options.Add("--largest", largest, "also exhaust a choice that takes a minute");
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
   const auto robot = kinematics::ReadRobotDescription(robot_folder);
   if (!robot) return program::Fail(kName, robot.error());
@@ -227,7 +281,8 @@ int main(int argc, char** argv) {
   }
   nlohmann::json rows = nlohmann::json::array();
   Learn(*robot, count, rows);
-  ChooseMarkers(rows);
+  ChooseJointly(largest, rows);
+  ChooseByVote(rows);
   std::printf("%s\n", rows.dump().c_str());
   return 0;
 }

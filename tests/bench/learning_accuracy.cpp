@@ -2,7 +2,8 @@
 // (EXEMPLAR_DATA), beside the figures of peers. Prints a table; every choice the learner makes is
 // made inside the training set.
 //
-// usage: learning_accuracy [paper|frames|auto|NAME=VALUE]...   (options hold for all methods)
+// usage: learning_accuracy [paper|frames|auto|selection|NAME=VALUE]...   (options hold for all
+// methods; selection: where the vote and the joint choice of markers differ, and what follows)
 
 #include <algorithm>
 #include <chrono>
@@ -16,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "../unit/learning/known_episodes.hpp"
 #include "exemplar/base/rng.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/demonstration/csv.hpp"
@@ -194,6 +196,92 @@ void Reach(int k, const char* method, const LearnOptions& options, const char* r
         Seconds(begin));
 }
 
+/// One alignment by each rule, of the same trials.
+struct BothAligned {
+  exemplar::learning::Alignment vote, joint;
+};
+
+Result<BothAligned> AlignByBoth(const std::vector<exemplar::learning::UniformTrial>& trials) {
+  LearnOptions options;
+  options.selection = exemplar::learning::Selection::kVote;
+  Result<exemplar::learning::Alignment> vote = Align(trials, options);
+  if (!vote.ok()) return vote.error();
+  options.selection = exemplar::learning::Selection::kJoint;
+  Result<exemplar::learning::Alignment> joint = Align(trials, options);
+  if (!joint.ok()) return joint.error();
+  return BothAligned{std::move(*vote), std::move(*joint)};
+}
+
+int CountDiffering(const BothAligned& both) {
+  int differing = 0;
+  for (std::size_t i = 0; i < both.vote.trials.size(); ++i) {
+    differing += both.vote.trials[i].chosen != both.joint.trials[i].chosen ? 1 : 0;
+  }
+  return differing;
+}
+
+void CompareSelectionsOf(const std::string& name, const std::vector<NamedTrial>& trials) {
+  std::vector<exemplar::learning::UniformTrial> prepared;
+  for (const NamedTrial& trial : trials) {
+    Result<exemplar::learning::UniformTrial> uniform =
+        Prepare(trial.trial, LearnOptions(), nullptr);
+    if (!uniform.ok()) {
+      std::fprintf(stderr, "%s: %s\n", trial.id.c_str(), uniform.error().message.c_str());
+      return;
+    }
+    prepared.push_back(std::move(*uniform));
+  }
+  const Result<BothAligned> both = AlignByBoth(prepared);
+  if (!both.ok()) {
+    std::fprintf(stderr, "%s: %s\n", name.c_str(), both.error().message.c_str());
+    return;
+  }
+  std::printf("%-24s %3zu trials %2zu markers  %3d differ   r %.3f / %.3f (in length only %.3f)\n",
+              name.c_str(), trials.size(), both->vote.knots_s.size() - 2, CountDiffering(*both),
+              both->vote.mean_correlation, both->joint.mean_correlation,
+              both->vote.plain_correlation);
+  std::fflush(stdout);
+}
+
+void CompareSelections() {
+  std::printf("choice of markers, vote / joint\n");
+  for (const char* name : {"rail_pressing", "rail_pushing"}) {
+    for (const std::vector<NamedTrial>& person : ByPerson(ReadFolder(DataFolder() / name))) {
+      CompareSelectionsOf(std::string(name) + " " + person[0].id.substr(0, person[0].id.find('_')),
+                          person);
+    }
+    CompareSelectionsOf(std::string(name) + " all", ReadFolder(DataFolder() / name));
+  }
+  CompareSelectionsOf("reach_target", ReadFolder(DataFolder() / "reach_target"));
+  CompareSelectionsOf("grating", ReadFolder(DataFolder() / "grating"));
+
+  constexpr int kSets = 100;
+  for (const int trials : {3, 4, 6}) {
+    Rng rng(1);
+    int vote_wrong = 0, joint_wrong = 0, differing = 0;
+    for (int set = 0; set < kSets; ++set) {
+      const auto all = exemplar::learning::DemonstrateAll(rng, trials);
+      std::vector<exemplar::learning::UniformTrial> of_set;
+      for (const auto& demonstration : all) of_set.push_back(demonstration.trial);
+      const Result<BothAligned> both = AlignByBoth(of_set);
+      if (!both.ok()) continue;
+      vote_wrong += exemplar::learning::CountWrongTrials(both->vote, all);
+      joint_wrong += exemplar::learning::CountWrongTrials(both->joint, all);
+      differing += CountDiffering(*both);
+    }
+    std::printf("generated, %d in a set    %3d trials             %3d differ   wrong %d / %d\n",
+                trials, kSets * trials, differing, vote_wrong, joint_wrong);
+  }
+  for (const char* name : {"rail_pressing", "rail_pushing"}) {
+    for (const bool joint : {false, true}) {
+      LearnOptions options;
+      options.selection =
+          joint ? exemplar::learning::Selection::kJoint : exemplar::learning::Selection::kVote;
+      LeaveOneOut(name, joint ? "joint" : "vote", options, "");
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -217,6 +305,10 @@ int main(int argc, char** argv) {
       "medians; cm and rad (reach_target: plot units)\n%-28s %-7s %8s /%7s  %6s  %6s  %8s   %s\n",
       "data", "method", "Frechet", "end", "turn", "head", "sigma", "best known peer");
   for (const std::string& name : methods) {
+    if (name == "selection") {
+      CompareSelections();
+      continue;
+    }
     given["method"] = name;
     const Result<LearnOptions> read = LearnOptions::FromStrings(given);
     if (!read.ok()) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -260,8 +261,9 @@ TEST_F(BadInputTest, EveryOptionOutOfRangeIsNamedWithItsValue) {
   ExpectAllTrialsKept("press", kPlaces.size());
 }
 
+// A thousand where EXEMPLAR_LONG_TRIALS is set (ctest -C All).
 TEST_F(BadInputTest, ManyTrialsAreLearnedWithProgressAndCanBeCancelled) {
-  constexpr int kMany = 120;
+  const int kMany = std::getenv("EXEMPLAR_LONG_TRIALS") != nullptr ? 1000 : 120;
   Rng rng(12);
   for (int i = 0; i < kMany; ++i) {
     const Place place{rng.Uniform(0.45, 0.62), rng.Uniform(-0.22, 0.12)};
@@ -295,10 +297,10 @@ TEST_F(BadInputTest, ManyTrialsAreLearnedWithProgressAndCanBeCancelled) {
                                               {});
   ASSERT_TRUE(report.ok()) << report.error().message;
   EXPECT_GT(told, kMany);
-  EXPECT_EQ(report->trials.size(), std::size_t{kMany});
+  EXPECT_EQ(report->trials.size(), static_cast<std::size_t>(kMany));
   const auto motion = skills().Query("press", 0, At({0.5, 0}));
   ASSERT_TRUE(motion.ok()) << motion.error().message;
-  ExpectAllTrialsKept("press", kMany);
+  ExpectAllTrialsKept("press", static_cast<std::size_t>(kMany));
 }
 
 }  // namespace

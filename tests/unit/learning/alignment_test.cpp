@@ -8,7 +8,7 @@
 #include "exemplar/learning/aligned.hpp"
 #include "exemplar/learning/warp.hpp"
 #include "exemplar/signal/resample.hpp"
-#include "motions.hpp"
+#include "known_episodes.hpp"
 
 namespace exemplar::learning {
 namespace {
@@ -17,67 +17,6 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-// A demonstration of known episodes: each joint goes from one level to the next by minimum jerk,
-// with a rest between; a spurious twist of the last joint may lie in a rest.
-struct Demonstration {
-  UniformTrial trial;
-  std::vector<double> begins_s;
-};
-
-const std::vector<std::vector<double>>& Levels() {
-  static const std::vector<std::vector<double>> levels = {
-      {0, 0, 0}, {0.9, -0.4, 0.2}, {0.6, 0.5, 0.3}, {0.05, 0.1, 0}};
-  return levels;
-}
-
-Demonstration Demonstrate(Rng& rng, const std::string& id, int spurious) {
-  Demonstration made;
-  struct Move {
-    double begin_s, duration_s;
-    std::vector<double> by;
-  };
-  std::vector<Move> moves;
-  double t = rng.Uniform(0.3, 0.6);
-  const double pace = rng.Uniform(0.8, 1.3);
-  for (std::size_t e = 1; e < Levels().size(); ++e) {
-    Move move{t, pace * rng.Uniform(0.8, 1.2), {}};
-    for (std::size_t j = 0; j < 3; ++j) {
-      move.by.push_back((Levels()[e][j] - Levels()[e - 1][j]) * rng.Uniform(0.95, 1.05));
-    }
-    made.begins_s.push_back(t);
-    t += move.duration_s;
-    moves.push_back(move);
-    const double rest_s = rng.Uniform(0.9, 1.4);
-    if (spurious > 0) {
-      --spurious;
-      moves.push_back({t + 0.25, 0.25, {0, 0, 0.12}});
-      moves.push_back({t + 0.5, 0.25, {0, 0, -0.12}});
-    }
-    t += rest_s;
-  }
-  made.trial = EvenTrial(t, 60);
-  made.trial.id = id;
-  made.trial.joint_names = {"a", "b", "c"};
-  const auto n = static_cast<Eigen::Index>(made.trial.time_s.size());
-  made.trial.joints = Eigen::MatrixXd::Zero(n, 3);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const double now = made.trial.time_s[static_cast<std::size_t>(k)];
-    for (const Move& move : moves) {
-      for (Eigen::Index j = 0; j < 3; ++j) {
-        made.trial.joints(k, j) += move.by[static_cast<std::size_t>(j)] *
-                                   MinimumJerk((now - move.begin_s) / move.duration_s);
-      }
-    }
-  }
-  return made;
-}
-
-std::vector<Demonstration> DemonstrateAll(Rng& rng, int n) {
-  std::vector<Demonstration> all;
-  for (int i = 0; i < n; ++i) all.push_back(Demonstrate(rng, "t" + std::to_string(i), i % 3));
-  return all;
-}
 
 std::vector<UniformTrial> TrialsOf(const std::vector<Demonstration>& all) {
   std::vector<UniformTrial> trials;
@@ -89,21 +28,6 @@ Alignment Aligned(std::vector<UniformTrial> trials, const LearnOptions& options 
   Result<Alignment> result = Align(std::move(trials), options);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
   return result.ok() ? std::move(*result) : Alignment{};
-}
-
-// Markers that miss: a marker is the rise through c, somewhat after its motion's begin.
-int CountWrongTrials(const Alignment& aligned, const std::vector<Demonstration>& all) {
-  constexpr double kLatest_s = 0.45;
-  int wrong = 0;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    bool right = true;
-    for (std::size_t e = 0; e < all[i].begins_s.size(); ++e) {
-      const double late = aligned.trials[i].own_knots_s[e + 1] - all[i].begins_s[e];
-      right = right && late > 0 && late < kLatest_s;
-    }
-    wrong += right ? 0 : 1;
-  }
-  return wrong;
 }
 
 // PAPER.md section 9, claim 3, with what the two rules do not share: a vote is also cast for
@@ -181,7 +105,9 @@ TEST(Align, MarkersOfAllTrialsFallOnTheirMean) {
     EXPECT_NEAR(aligned.knots_s[k], mean, 1e-12);
   }
   EXPECT_EQ(aligned.time_s.back(), aligned.knots_s.back());
-  for (const AlignedTrial& trial : aligned.trials) {
+  for (std::size_t i = 0; i < aligned.trials.size(); ++i) {
+    const AlignedTrial& trial = aligned.trials[i];
+    const UniformTrial warped = Warped(aligned, i);
     ASSERT_EQ(trial.chosen.size() + 2, trial.own_knots_s.size());
     for (std::size_t m = 0; m < trial.chosen.size(); ++m) {
       const Marker& marker = trial.segmentation.markers[static_cast<std::size_t>(trial.chosen[m])];
@@ -189,9 +115,9 @@ TEST(Align, MarkersOfAllTrialsFallOnTheirMean) {
       EXPECT_NEAR(marker.time_s, trial.own_knots_s[m + 1], 0.04);
     }
     // Start on start, end on end.
-    EXPECT_EQ(trial.warped.joints.row(0), trial.own.joints.row(0));
-    EXPECT_LT((trial.warped.joints.bottomRows(1) - trial.own.joints.bottomRows(1)).norm(), 1e-12);
-    EXPECT_EQ(trial.warped.time_s, aligned.time_s);
+    EXPECT_EQ(warped.joints.row(0), trial.own.joints.row(0));
+    EXPECT_LT((warped.joints.bottomRows(1) - trial.own.joints.bottomRows(1)).norm(), 1e-12);
+    EXPECT_EQ(warped.time_s, aligned.time_s);
   }
 }
 
@@ -333,12 +259,14 @@ TEST(Align, AnyTrialsGiveOneFiniteMotion) {
     const Alignment aligned = Aligned(trials, options);
     ASSERT_EQ(aligned.trials.size(), n);
     EXPECT_TRUE(aligned.canonical_joints.allFinite());
-    for (const AlignedTrial& trial : aligned.trials) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const AlignedTrial& trial = aligned.trials[i];
+      const UniformTrial warped = Warped(aligned, i);
       for (std::size_t k = 1; k < trial.own_knots_s.size(); ++k) {
         ASSERT_GT(trial.own_knots_s[k], trial.own_knots_s[k - 1]);
       }
-      EXPECT_LE(trial.warped.joints.maxCoeff(), trial.own.joints.maxCoeff() + 1e-12);
-      EXPECT_GE(trial.warped.joints.minCoeff(), trial.own.joints.minCoeff() - 1e-12);
+      EXPECT_LE(warped.joints.maxCoeff(), trial.own.joints.maxCoeff() + 1e-12);
+      EXPECT_GE(warped.joints.minCoeff(), trial.own.joints.minCoeff() - 1e-12);
     }
   }
 }
@@ -368,8 +296,8 @@ TEST(Align, ElasticRegistrationBringsTrialsTogetherWithoutMarkers) {
   // How far apart the trials' joints are at one common time, root mean square.
   const auto spread = [](const Alignment& alignment) {
     double squared = 0;
-    for (const AlignedTrial& trial : alignment.trials) {
-      squared += (trial.warped.joints - alignment.canonical_joints).squaredNorm();
+    for (std::size_t i = 0; i < alignment.trials.size(); ++i) {
+      squared += (Warped(alignment, i).joints - alignment.canonical_joints).squaredNorm();
     }
     return std::sqrt(squared / static_cast<double>(alignment.canonical_joints.size()) / 5);
   };
@@ -398,18 +326,18 @@ TEST(WarpTrial, OneWarpServesAllStreams) {
   const auto n = static_cast<Eigen::Index>(trial.time_s.size());
   trial.joints.resize(n, 1);
   trial.touch_n.resize(n);
-  trial.base_T_object.resize(2);
   trial.object_names = {"moving", "still"};
   const geometry::Pose place{{0.1, 0.2, 0.3}, geometry::ExpSo3({0.3, 0.1, 0.2})};
+  std::vector<geometry::Pose> moving;
   for (Eigen::Index k = 0; k < n; ++k) {
     const double t = trial.time_s[static_cast<std::size_t>(k)];
     trial.joints(k, 0) = t;
     trial.touch_n[k] = t;
     trial.hand_open.push_back(t);
     trial.base_T_tool.push_back({{t, 0, 0}, geometry::ExpSo3({0, 0, t})});
-    trial.base_T_object[0].push_back(geometry::Pose::FromTranslation({0, t, 0}));
-    trial.base_T_object[1].push_back(place);
+    moving.push_back(geometry::Pose::FromTranslation({0, t, 0}));
   }
+  trial.base_T_object = {PosePath(moving), PosePath(moving.size(), place)};
   const std::vector<double> common = signal::EvenTimes(0, 4, 200);
   const UniformTrial warped =
       WarpTrial(trial, std::vector<double>{0, 1, 3}, std::vector<double>{0, 2.5, 4}, common);

@@ -129,6 +129,31 @@ TEST(CardinalRbf, LeaveOneOutEqualsFittingWithoutTheTrial) {
   }
 }
 
+TEST(CardinalRbf, LeftOutWeightsAreThoseOfFittingTheOthers) {
+  Rng rng(12);
+  for (const int n : {7, 120}) {
+    Eigen::MatrixXd positions =
+        Eigen::MatrixXd::NullaryExpr(n, 3, [&] { return rng.Uniform(-1, 1); });
+    positions.row(5) = positions.row(2);  // a place that was shown twice
+    for (const Trend trend : {Trend::kConstant, Trend::kAffine}) {
+      const RbfOptions options{.trend = trend, .ridge = 0};
+      const CardinalRbf all(positions, options);
+      for (int out = 0; out < n; out += n / 7) {
+        std::vector<int> kept;
+        for (int j = 0; j < n; ++j) {
+          if (j != out) kept.push_back(j);
+        }
+        const CardinalRbf others(positions(kept, Eigen::all), options);
+        const Eigen::VectorXd weights = all.LeftOutWeights(out);
+        EXPECT_EQ(weights[out], 0);
+        EXPECT_NEAR(weights.sum(), 1, 1e-9);
+        EXPECT_LT((weights(kept) - others.Weights(positions.row(out).transpose())).norm(), 1e-7)
+            << n << " " << out;
+      }
+    }
+  }
+}
+
 TEST(CardinalRbf, AnswersForCoplanarPositionsWithTheTrendOfTheirPlane) {
   Rng rng(10);
   MatrixXd p = RandomPositions(6, rng);

@@ -443,8 +443,8 @@ TEST(SkillJson, DamagedTextIsAnError) {
   const nlohmann::json good = ToJson(Learn(MakePresses(3), Method::kPaper));
   EXPECT_FALSE(SkillFromJson(nlohmann::json::object()).ok());
   for (const char* path :
-       {"/report/method", "/alignment/trials/0/warped/base_T_tool", "/alignment/time_s", "/model",
-        "/alignment/trials/1/warped/joints/values"}) {
+       {"/report/method", "/alignment/trials/0/own/base_T_tool", "/alignment/time_s", "/model",
+        "/alignment/trials/1/own/joints/values"}) {
     nlohmann::json bad = good;
     bad[nlohmann::json::json_pointer(path)] = nlohmann::json::array({1, 2});
     const Result<Skill> read = SkillFromJson(bad, kArm);

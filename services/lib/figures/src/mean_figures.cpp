@@ -147,6 +147,10 @@ Figure AlignedPaths(const Subject& subject) {
   for (const learning::UniformTrial& trial : plain) {
     plain_mean += PositionsOf(trial.base_T_tool) / static_cast<double>(plain.size());
   }
+  std::vector<Eigen::MatrixXd> paths;
+  for (std::size_t i = 0; i < alignment.trials.size(); ++i) {
+    paths.push_back(PositionsOf(learning::Warped(alignment, i).base_T_tool));
+  }
   Page page(Heading(9, kTitle));
   double top = Page::kTop;
   for (int axis = 0; axis < 3; ++axis) {
@@ -156,9 +160,9 @@ Figure AlignedPaths(const Subject& subject) {
     Panel& panel = page.Add<Panel>(
         box, PanelText{.title = name, .x = "common time in s", .y = name + " in m"});
     panel.TightX();
-    for (const learning::AlignedTrial& trial : alignment.trials) {
-      panel.Line(alignment.time_s, PositionsOf(trial.warped.base_T_tool).col(axis),
-                 {.colour = kPale, .width = 1.1}, "trials, aligned");
+    for (const Eigen::MatrixXd& path : paths) {
+      panel.Line(alignment.time_s, path.col(axis), {.colour = kPale, .width = 1.1},
+                 "trials, aligned");
     }
     panel.Line(alignment.time_s, plain_mean.col(axis),
                {.colour = kVermilion, .width = 2.2, .dash = "7 3"}, "plain mean (length only)");

@@ -255,20 +255,18 @@ Result<Alignment> Align(std::vector<UniformTrial> trials, const LearnOptions& op
 
   for (std::size_t i = 0; i < n; ++i) {
     if (stop.stop_requested()) return cancelled();
-    AlignedTrial& trial = result.trials[i];
-    trial.warped = WarpTrial(trial.own, own_knots[i], result.knots_s, result.time_s);
-    report(0.7 + 0.3 * static_cast<double>(i + 1) / static_cast<double>(n), "warping");
-  }
-  const UniformTrial& first = result.trials.front().warped;
-  result.canonical_joints = Eigen::MatrixXd::Zero(frames, first.joints.cols());
-  result.canonical_tool = Eigen::MatrixXd::Zero(first.base_T_tool.empty() ? 0 : frames, 3);
-  for (const AlignedTrial& trial : result.trials) {
-    result.canonical_joints += trial.warped.joints / static_cast<double>(n);
+    const UniformTrial warped = Warped(result, i);
+    if (i == 0) {
+      result.canonical_joints = Eigen::MatrixXd::Zero(frames, warped.joints.cols());
+      result.canonical_tool = Eigen::MatrixXd::Zero(warped.base_T_tool.empty() ? 0 : frames, 3);
+    }
+    result.canonical_joints += warped.joints / static_cast<double>(n);
     for (Eigen::Index k = 0; k < result.canonical_tool.rows(); ++k) {
       result.canonical_tool.row(k) +=
-          trial.warped.base_T_tool[static_cast<std::size_t>(k)].translation.transpose() /
+          warped.base_T_tool[static_cast<std::size_t>(k)].translation.transpose() /
           static_cast<double>(n);
     }
+    report(0.7 + 0.3 * static_cast<double>(i + 1) / static_cast<double>(n), "warping");
   }
   result.mean_correlation =
       MeanCorrelation(WarpedSignals(result.trials, own_knots, result.knots_s, result.time_s));

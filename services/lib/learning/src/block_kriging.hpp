@@ -7,29 +7,54 @@
 
 namespace exemplar::learning {
 
-/// n trials with 3-vectors at N frames; the covariance between two trials is a 3 x 3 block, the
-/// same for every frame but for a scale. Immutable.
+/// Covariance of n trials of 3-vectors, in units of the noise: P P^T + T (S x I) T^T, the same for
+/// every frame but for a scale. What all trials share in a few directions is P; what depends on how
+/// alike two situations are is S.
+struct PartedCovariance {
+  Eigen::MatrixXd parts;               ///< P, 3n x r
+  Eigen::MatrixXd similarity;          ///< S, n x n; empty: none
+  std::vector<Eigen::Matrix3d> turns;  ///< T's diagonal blocks, rotations; empty: none
+};
+
+/// Immutable. The inverse of few trials is kept whole; of many, that of the n x n similarity with
+/// noise, corrected for the r parts (Woodbury): a 27th of the work and a 9th of the memory.
 class BlockKriging {
  public:
-  /// `covariance`: 3n x 3n between the trials, in units of the noise, which is added here.
-  /// `values`: 3n x N.
-  BlockKriging(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& values);
+  /// `covariance` without the noise, which is added here.
+  explicit BlockKriging(const PartedCovariance& covariance);
 
-  /// Value minus what the other trials predict: 3n x N. Rippa 1999, in blocks.
-  const Eigen::MatrixXd& left_out_errors() const { return errors_; }
-  /// Variance of the noise at each frame (N), from the left-out errors and what they should be.
-  const Eigen::VectorXd& noise_variance() const { return noise_; }
-  /// 3n x 3n: the prediction is cross * inverse * values, where `cross` is the 3 x 3n covariance of
-  /// the wanted trial with the others.
+  /// Inverse of the covariance with noise, times `values` (3n x m). The prediction is cross *
+  /// these, where `cross` is the 3 x 3n covariance of the wanted trial with the others.
+  Eigen::MatrixXd Duals(const Eigen::Ref<const Eigen::MatrixXd>& values) const;
+  /// The inverse itself, 3n x 3n; empty where the trials are many.
   const Eigen::MatrixXd& inverse() const { return inverse_; }
-  /// inverse * values: 3n x N.
-  Eigen::MatrixXd Duals(const Eigen::MatrixXd& values) const { return inverse_ * values; }
+
+  /// Value minus what the other trials predict (Rippa 1999, in blocks), times `share`, added to
+  /// `errors` (3n x N). Returns the noise's variance at each frame (N), from these errors and what
+  /// they should be.
+  Eigen::VectorXd AddLeftOutErrors(const Eigen::MatrixXd& values, double share,
+                                   Eigen::MatrixXd& errors) const;
+
+  /// The deviation that a trial's left-out error should have, in units of the noise.
+  double LeftOutSpread(Eigen::Index trial) const;
 
  private:
-  Eigen::MatrixXd inverse_;
-  Eigen::MatrixXd errors_;
-  Eigen::VectorXd noise_;
+  Eigen::Matrix3d DiagonalBlock(Eigen::Index trial) const;
+
+  Eigen::Index trials_ = 0;
+  Eigen::MatrixXd inverse_;             // 3n x 3n; empty: of many trials
+  Eigen::MatrixXd similarity_inverse_;  // n x n, of S + I; empty: of I
+  std::vector<Eigen::Matrix3d> turns_;
+  Eigen::MatrixXd correction_;  // 3n x r: what to take off is correction_ correction_^T
 };
+
+/// Choices between models are made on at most this many trials; answers use all.
+inline constexpr int kMostForChoice = 40;
+/// At most `most` of n, evenly.
+std::vector<int> EvenChoice(int n, int most);
+/// The chosen trials' rows of `values` (3n x N) at an even choice of frames with the first and the
+/// last among them.
+Eigen::MatrixXd FramesForChoice(const Eigen::MatrixXd& values, const std::vector<int>& chosen);
 
 /// How bad left-out errors (3n x N) are: mean distance, half the mean of each trial's largest, and
 /// the mean at the end. Paths are judged by their shape and by where they end.

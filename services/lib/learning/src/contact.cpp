@@ -276,7 +276,8 @@ std::vector<Eigen::Vector3d> ContactPlaces(const Exemplars& exemplars, const Con
 
 void FindContacts(const Alignment& alignment, Exemplars& exemplars) {
   exemplars.contacts.clear();
-  for (ExemplarTrial& trial : exemplars.trials) trial.own_contacts.clear();
+  for (std::size_t j = 0; j < exemplars.trials.size(); ++j)
+    exemplars.trials.Edit(j).own_contacts.clear();
   if (exemplars.objects() == 0) return;
   exemplars.contacts = ContactsFromTouch(exemplars);
   if (!exemplars.contacts.empty() || !exemplars.has_tool) return;
@@ -310,7 +311,7 @@ void FindContacts(const Alignment& alignment, Exemplars& exemplars) {
   for (const FoundContact& contact : kept) {
     exemplars.contacts.push_back(contact.span);
     for (std::size_t j = 0; j < exemplars.trials.size(); ++j) {
-      exemplars.trials[j].own_contacts.push_back(contact.windows[j]);
+      exemplars.trials.Edit(j).own_contacts.push_back(contact.windows[j]);
     }
   }
 }

@@ -26,7 +26,8 @@ double ToolExtent(const UniformTrial& trial) {
   return (high - low).norm();
 }
 
-bool Rests(const std::vector<geometry::Pose>& path, double extent) {
+bool Rests(const PosePath& path, double extent) {
+  if (path.still()) return true;
   for (const geometry::Pose& pose : path) {
     if ((pose.translation - path[0].translation).norm() > kRestingPart * extent) return false;
     if (geometry::AngleBetween(pose.rotation, path[0].rotation) > kRestingAngle) return false;
@@ -34,7 +35,8 @@ bool Rests(const std::vector<geometry::Pose>& path, double extent) {
   return true;
 }
 
-geometry::Pose MeanPose(const std::vector<geometry::Pose>& path) {
+geometry::Pose MeanPose(const PosePath& path) {
+  if (path.still()) return path.front();
   geometry::Pose mean;
   std::vector<Eigen::Quaterniond> rotations;
   for (const geometry::Pose& pose : path) {
@@ -131,13 +133,52 @@ std::optional<int> Exemplars::FirstContact(int object) const {
 
 Exemplars Exemplars::Without(int trial) const {
   Exemplars others = *this;
-  others.trials.erase(others.trials.begin() + trial);
+  others.trials.Remove(static_cast<std::size_t>(trial));
   return others;
+}
+
+Exemplars Exemplars::Only(std::span<const int> chosen) const {
+  Exemplars few = *this;
+  few.trials = {};
+  for (const int trial : chosen) few.trials.Share(trials, static_cast<std::size_t>(trial));
+  return few;
+}
+
+void Exemplars::KeepPathsOnly() {
+  joint_names.clear();
+  has_orientation = false;
+  for (std::size_t j = 0; j < trials.size(); ++j) {
+    ExemplarTrial& trial = trials.Edit(j);
+    trial.joints.resize(frames, 0);
+    trial.hand.resize(0);
+    trial.touch_n.resize(0);
+  }
+}
+
+void Exemplars::DropTimes() {
+  for (std::size_t j = 0; j < trials.size(); ++j) {
+    ExemplarTrial& trial = trials.Edit(j);
+    trial.touch_n.resize(0);
+    trial.own_time.resize(0);
+  }
+}
+
+Exemplars Exemplars::SituationsOnly() const {
+  Exemplars situations = *this;
+  for (std::size_t j = 0; j < trials.size(); ++j) {
+    ExemplarTrial situation;
+    situation.situation = trials[j].situation;
+    situation.own_contacts = trials[j].own_contacts;
+    situation.moving.resize(object_names.size());
+    if (j == 0) situation.tool = trials[j].tool;
+    situations.trials.Replace(j, std::move(situation));
+  }
+  return situations;
 }
 
 Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
                          const demonstration::ToolKinematics* tool) {
-  const UniformTrial& first = alignment.trials.front().warped;
+  const UniformTrial& first = alignment.trials.front().own;
   Exemplars exemplars;
   exemplars.frames = static_cast<int>(alignment.time_s.size());
   exemplars.object_names = first.object_names;
@@ -145,19 +186,24 @@ Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
   exemplars.joint_names =
       tool != nullptr && !first.joint_names.empty() ? tool->joint_names() : first.joint_names;
   exemplars.has_tool = !first.base_T_tool.empty();
-  for (const AlignedTrial& aligned : alignment.trials) {
-    const UniformTrial& warped = aligned.warped;
+  for (std::size_t j = 0; j < alignment.trials.size(); ++j) {
+    const AlignedTrial& aligned = alignment.trials[j];
+    UniformTrial warped = Warped(alignment, j);
     exemplars.has_orientation = exemplars.has_orientation && warped.has_orientation;
     ExemplarTrial trial;
-    trial.tool = warped.base_T_tool;
-    trial.joints.resize(exemplars.frames, exemplars.joints());
+    const double extent = ToolExtent(warped);
     const std::vector<int> columns = JointColumns(warped, exemplars.joint_names);
-    for (int k = 0; k < exemplars.joints(); ++k) {
-      trial.joints.col(k) = warped.joints.col(columns[static_cast<std::size_t>(k)]);
+    if (warped.joint_names == exemplars.joint_names) {
+      trial.joints = std::move(warped.joints);
+    } else {
+      trial.joints.resize(exemplars.frames, exemplars.joints());
+      for (int k = 0; k < exemplars.joints(); ++k) {
+        trial.joints.col(k) = warped.joints.col(columns[static_cast<std::size_t>(k)]);
+      }
     }
     trial.hand = Eigen::Map<const Eigen::VectorXd>(
         warped.hand_open.data(), static_cast<Eigen::Index>(warped.hand_open.size()));
-    trial.touch_n = warped.touch_n;
+    trial.touch_n = std::move(warped.touch_n);
     const MonotoneHermite own_at(alignment.knots_s, aligned.own_knots_s);
     trial.own_time.resize(exemplars.frames);
     for (int i = 0; i < exemplars.frames; ++i) {
@@ -165,19 +211,20 @@ Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
           own_at(alignment.time_s[static_cast<std::size_t>(i)]) / aligned.own_knots_s.back();
     }
     if (exemplars.has_tool) trial.situation.base_T_start = warped.base_T_tool.front();
-    const double extent = ToolExtent(warped);
+    trial.tool = std::move(warped.base_T_tool);
     for (std::size_t o = 0; o < exemplars.object_names.size(); ++o) {
       const auto at =
           static_cast<std::size_t>(std::find(warped.object_names.begin(), warped.object_names.end(),
                                              exemplars.object_names[o]) -
                                    warped.object_names.begin());
-      const std::vector<geometry::Pose>& path = warped.base_T_object[at];
+      const PosePath& path = warped.base_T_object[at];
       if (!warped.object_has_orientation[at]) exemplars.object_has_orientation[o] = false;
       const bool rests = Rests(path, extent);
       trial.situation.base_T_object.push_back(rests ? MeanPose(path) : path.front());
-      trial.moving.push_back(rests ? std::vector<geometry::Pose>{} : path);
+      trial.moving.push_back(rests ? std::vector<geometry::Pose>{}
+                                   : static_cast<std::vector<geometry::Pose>>(path));
     }
-    exemplars.trials.push_back(std::move(trial));
+    exemplars.trials.Add(std::move(trial));
   }
   exemplars.target = ChooseTarget(exemplars);
   for (int o = 0; o < exemplars.objects(); ++o) {
@@ -185,7 +232,8 @@ Exemplars BuildExemplars(const Alignment& alignment, const std::string& target,
   }
   AlignTouches(exemplars);
   FindContacts(alignment, exemplars);
-  for (ExemplarTrial& trial : exemplars.trials) {
+  for (std::size_t j = 0; j < exemplars.trials.size(); ++j) {
+    ExemplarTrial& trial = exemplars.trials.Edit(j);
     for (int o = 0; o < exemplars.objects(); ++o) {
       std::vector<geometry::Pose>& path = trial.moving[static_cast<std::size_t>(o)];
       if (path.empty()) continue;

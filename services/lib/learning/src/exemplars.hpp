@@ -3,6 +3,7 @@
 // verb).
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -61,6 +62,51 @@ struct ContactSpan {
   bool at_one_time = false;  ///< the trials are aligned so that all are in contact at these frames
 };
 
+/// Trials that copies of the list share: a list is copied without its trials. Thread-compatible.
+class SharedTrials {
+ public:
+  std::size_t size() const { return trials_.size(); }
+  bool empty() const { return trials_.empty(); }
+  const ExemplarTrial& operator[](std::size_t j) const { return *trials_[j]; }
+  const ExemplarTrial& front() const { return *trials_.front(); }
+  void Add(ExemplarTrial trial) {
+    trials_.push_back(std::make_shared<ExemplarTrial>(std::move(trial)));
+  }
+  void Replace(std::size_t j, ExemplarTrial trial) {
+    trials_[j] = std::make_shared<ExemplarTrial>(std::move(trial));
+  }
+  /// To change it: a trial that another list holds too is copied first.
+  ExemplarTrial& Edit(std::size_t j) {
+    if (trials_[j].use_count() > 1) Replace(j, *trials_[j]);
+    return *trials_[j];
+  }
+  /// Frees the joints of a trial that no other list holds.
+  void DropJoints(std::size_t j) {
+    if (trials_[j].use_count() == 1) trials_[j]->joints.resize(0, 0);
+  }
+  void Share(const SharedTrials& others, std::size_t j) { trials_.push_back(others.trials_[j]); }
+  void Remove(std::size_t j) { trials_.erase(trials_.begin() + static_cast<std::ptrdiff_t>(j)); }
+
+  class Iterator {
+   public:
+    explicit Iterator(const std::shared_ptr<ExemplarTrial>* at) : at_(at) {}
+    const ExemplarTrial& operator*() const { return **at_; }
+    Iterator& operator++() {
+      ++at_;
+      return *this;
+    }
+    friend bool operator==(const Iterator&, const Iterator&) = default;
+
+   private:
+    const std::shared_ptr<ExemplarTrial>* at_;
+  };
+  Iterator begin() const { return Iterator(trials_.data()); }
+  Iterator end() const { return Iterator(trials_.data() + trials_.size()); }
+
+ private:
+  std::vector<std::shared_ptr<ExemplarTrial>> trials_;  // shared so that copies cost nothing
+};
+
 struct Exemplars {
   int frames = 0;
   std::vector<std::string> object_names;
@@ -69,7 +115,7 @@ struct Exemplars {
   bool has_tool = false;
   bool has_orientation = true;
   std::vector<std::string> joint_names;
-  std::vector<ExemplarTrial> trials;
+  SharedTrials trials;
   std::vector<ContactSpan> contacts;
 
   int size() const { return static_cast<int>(trials.size()); }
@@ -81,7 +127,16 @@ struct Exemplars {
   Eigen::MatrixXd ShiftedPath(int trial, int object) const;
   /// The first contact with `object`, if any.
   std::optional<int> FirstContact(int object) const;
+  /// The others; no trial is copied.
   Exemplars Without(int trial) const;
+  /// These trials, in this order; none is copied.
+  Exemplars Only(std::span<const int> chosen) const;
+  /// Gives up what moves beside the tool: joints, hand, touch and the tool's orientation.
+  void KeepPathsOnly();
+  /// Gives up touch and the trials' own times, which no model needs.
+  void DropTimes();
+  /// Without streams, but for the first trial's tool path.
+  Exemplars SituationsOnly() const;
 };
 
 /// Gathers the warped streams. `target` empty: the object towards whose frame the paths converge

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "block_kriging.hpp"
 #include "exemplar/learning/objectivity.hpp"
+#include "freed_memory.hpp"
 #include "rotations.hpp"
 
 namespace exemplar::learning {
@@ -25,16 +27,21 @@ double Smoothstep(double s) {
 CardinalRbf ChooseStyle(const Exemplars& exemplars) {
   const int width = exemplars.target < 0 ? 0 : 3;
   Eigen::MatrixXd positions(exemplars.size(), width);
+  for (int j = 0; j < exemplars.size() && width > 0; ++j) {
+    positions.row(j) = exemplars.trials[static_cast<std::size_t>(j)]
+                           .situation.base_T_object[static_cast<std::size_t>(exemplars.target)]
+                           .translation.transpose();
+  }
   // One row a trial; every tenth frame tells enough.
+  const std::vector<int> chosen = EvenChoice(exemplars.size(), kMostForChoice);
   const int step = std::max(1, exemplars.frames / 60);
   const int rows = (exemplars.frames + step - 1) / step;
-  Eigen::MatrixXd samples(exemplars.size(), rows * exemplars.joints());
-  for (int j = 0; j < exemplars.size(); ++j) {
-    const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
-    if (width > 0) {
-      positions.row(j) = trial.situation.base_T_object[static_cast<std::size_t>(exemplars.target)]
-                             .translation.transpose();
-    }
+  Eigen::MatrixXd samples(static_cast<Eigen::Index>(chosen.size()), rows * exemplars.joints());
+  Eigen::MatrixXd places(samples.rows(), width);
+  for (Eigen::Index j = 0; j < samples.rows(); ++j) {
+    const int at = chosen[static_cast<std::size_t>(j)];
+    const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(at)];
+    places.row(j) = positions.row(at);
     for (int k = 0; k < exemplars.joints(); ++k) {
       for (int r = 0; r < rows; ++r) samples(j, k * rows + r) = trial.joints(r * step, k);
     }
@@ -45,7 +52,7 @@ CardinalRbf ChooseStyle(const Exemplars& exemplars) {
     for (const Trend trend : {Trend::kConstant, Trend::kAffine}) {
       for (const double ridge : {0.0, 0.1, 1.0}) {
         const RbfOptions options{.trend = trend, .ridge = ridge};
-        const double error = CardinalRbf(positions, options).LeaveOneOut(samples).squaredNorm();
+        const double error = CardinalRbf(places, options).LeaveOneOut(samples).squaredNorm();
         if (error < least * (1 - 1e-6)) {
           least = error;
           best = options;
@@ -56,9 +63,19 @@ CardinalRbf ChooseStyle(const Exemplars& exemplars) {
   return CardinalRbf(positions, best);
 }
 
+Eigen::VectorXd Upsilon(const Exemplars& exemplars, int object) {
+  std::vector<Eigen::MatrixXd> base;
+  std::vector<Eigen::MatrixXd> shifted;
+  for (int j = 0; j < exemplars.size(); ++j) {
+    base.push_back(exemplars.BasePath(j));
+    shifted.push_back(exemplars.ShiftedPath(j, object));
+  }
+  return ComputeObjectivity(base, shifted, exemplars.FirstContact(object)).upsilon;
+}
+
 }  // namespace
 
-FramesModel::FramesModel(const Exemplars& exemplars)
+FramesModel::FramesModel(Exemplars exemplars)
     : frames_(exemplars.frames),
       target_(exemplars.target),
       joints_count_(exemplars.joints()),
@@ -72,14 +89,16 @@ FramesModel::FramesModel(const Exemplars& exemplars)
     const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
     joints.col(j) = trial.joints.reshaped();
     if (has_hand) hand.col(j) = trial.hand;
+    exemplars.trials.DropJoints(static_cast<std::size_t>(j));
   }
+  ReturnFreedMemory();
   joints_ = Streams(joints);
   hand_ = Streams(hand);
+  joints.resize(0, 0);
   objectivity_ = Eigen::MatrixXd::Zero(frames_, exemplars.objects());
   if (!exemplars.has_tool) return;
 
   path_.emplace(exemplars);
-  rotation_.emplace(exemplars, *path_);
   for (const ContactSpan& contact : contacts_) {
     contact_points_.push_back(MeanContactPoint(exemplars, contact));
     double squared = 0;
@@ -95,17 +114,13 @@ FramesModel::FramesModel(const Exemplars& exemplars)
                             (contact.last > contact.first ? kClearlyCloser * path_error_m : 0) +
                                 kExact_m);
   }
-  std::vector<Eigen::MatrixXd> base;
-  for (int j = 0; j < n; ++j) base.push_back(exemplars.BasePath(j));
+  path_->ForgetLeftOut();
   for (int o = 0; o < exemplars.objects(); ++o) {
-    if (o == target_) {
-      objectivity_.col(o) = 1.0 - path_->start_share().array();
-      continue;
-    }
-    std::vector<Eigen::MatrixXd> shifted;
-    for (int j = 0; j < n; ++j) shifted.push_back(exemplars.ShiftedPath(j, o));
-    objectivity_.col(o) = ComputeObjectivity(base, shifted, exemplars.FirstContact(o)).upsilon;
+    objectivity_.col(o) =
+        o == target_ ? Eigen::VectorXd(1.0 - path_->start_share().array()) : Upsilon(exemplars, o);
   }
+  ReturnFreedMemory();
+  if (exemplars.has_orientation) rotation_.emplace(exemplars, *path_);
 }
 
 Eigen::VectorXd FramesModel::StyleWeights(const Situation& situation) const {
@@ -151,7 +166,13 @@ Prediction FramesModel::Predict(const Situation& situation) const {
     // What the noise of the trials leaves between the answer's first frame and the start.
     const Eigen::RowVector3d missing = where.start.transpose() - answer.positions.row(0);
     answer.positions += start_share * missing;
-    prediction.tool = ToPoses(answer.positions, rotation_->Predict(situation, where));
+    Eigen::MatrixX4d rotations;
+    if (rotation_.has_value()) {
+      rotations = rotation_->Predict(situation, where);
+    } else {
+      rotations = Eigen::RowVector4d(0, 0, 0, 1).replicate(frames_, 1);
+    }
+    prediction.tool = ToPoses(answer.positions, rotations);
     prediction.sigma_m = std::move(answer.sigma_m);
     MeetContacts(situation, prediction);
     if (situation.base_T_start.has_value()) {
@@ -163,7 +184,7 @@ Prediction FramesModel::Predict(const Situation& situation) const {
       prediction.warnings.push_back(
           "no start was given: the motion begins where the trials began on average");
     }
-    if (rotation_->assumed() && target_ >= 0) {
+    if (rotation_.has_value() && rotation_->assumed() && target_ >= 0) {
       const Eigen::Quaterniond shown(path_->shown_turn());
       const double angle = geometry::AngleBetween(
           shown, situation.base_T_object[static_cast<std::size_t>(target_)].rotation);
@@ -187,15 +208,21 @@ Prediction FramesModel::Predict(const Situation& situation) const {
   return prediction;
 }
 
-std::optional<Eigen::Matrix3Xd> FramesModel::LeftOut(int trial) const {
-  if (!path_.has_value()) return std::nullopt;
-  return path_->LeftOut(trial);
+std::vector<LeftOutTrial> FramesModel::LeftOut() const {
+  std::vector<LeftOutTrial> trials;
+  for (int j = 0; path_.has_value() && j < path_->size(); ++j) {
+    trials.push_back({path_->LeftOutDistance(j), path_->LeftOutSpread(j)});
+  }
+  return trials;
 }
 
 std::string FramesModel::Describe() const {
   if (!path_.has_value()) return "joints";
-  return "position: " + path_->Describe() +
-         "; orientation: " + (rotation_->turns_with_object() ? "object" : "world");
+  std::string text = "position: " + path_->Describe();
+  if (rotation_.has_value()) {
+    text += std::string("; orientation: ") + (rotation_->turns_with_object() ? "object" : "world");
+  }
+  return text;
 }
 
 }  // namespace exemplar::learning

@@ -17,11 +17,11 @@ namespace exemplar::learning {
 /// Immutable.
 class FramesModel final : public Model {
  public:
-  explicit FramesModel(const Exemplars& exemplars);
+  /// Gives the trials' joints up as it takes them over, where nobody else holds them.
+  explicit FramesModel(Exemplars exemplars);
   Prediction Predict(const Situation& situation) const override;
 
-  /// Tool path of a training trial as the others predict it (closed form), base frame.
-  std::optional<Eigen::Matrix3Xd> LeftOut(int trial) const;
+  std::vector<LeftOutTrial> LeftOut() const override;
   std::string Describe() const;
 
  private:

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <memory>
+#include <numeric>
 
 #include "exemplar/learning/marker_choice.hpp"
 #include "joint_search.hpp"
@@ -80,10 +81,8 @@ class Refinement {
   long long correlations_ = 0;
 };
 
-}  // namespace
-
-MarkerChoice ChooseJointly(std::span<const MarkerCandidates> trials,
-                           const MarkerChoiceOptions& options) {
+MarkerChoice ChooseTogether(std::span<const MarkerCandidates> trials,
+                            const MarkerChoiceOptions& options) {
   MarkerChoice choice;
   const std::size_t n = trials.size();
   choice.chosen.resize(n);
@@ -128,6 +127,85 @@ MarkerChoice ChooseJointly(std::span<const MarkerCandidates> trials,
     }
   }
   return choice;
+}
+
+// Trials that are chosen for together; beyond, each of the others joins an even choice of them.
+constexpr std::size_t kMostTogether = 100;
+constexpr std::size_t kCore = 50;
+constexpr double kMostSubsets = 120;  // of a trial that joins
+
+std::vector<std::size_t> CoreOf(std::span<const MarkerCandidates> trials) {
+  const auto fewest = std::min_element(trials.begin(), trials.end(),
+                                       [](const MarkerCandidates& a, const MarkerCandidates& b) {
+                                         return a.time_s.size() < b.time_s.size();
+                                       });
+  const auto least = static_cast<std::size_t>(fewest - trials.begin());
+  std::vector<std::size_t> core;
+  for (std::size_t k = 0; k < kCore; ++k) core.push_back(k * trials.size() / kCore);
+  // The trial that decides how many markers there are is one of them.
+  if (!std::binary_search(core.begin(), core.end(), least)) {
+    *std::lower_bound(core.begin(), core.end() - 1, least) = least;
+  }
+  return core;
+}
+
+// The candidates of greatest score, so few that their subsets are.
+std::vector<int> Clearest(const MarkerCandidates& trial, std::size_t size) {
+  std::vector<int> kept(trial.time_s.size());
+  std::iota(kept.begin(), kept.end(), 0);
+  while (kept.size() > size && Binomial(kept.size(), size) > kMostSubsets) {
+    kept.erase(std::min_element(kept.begin(), kept.end(), [&](int a, int b) {
+      return trial.score[static_cast<std::size_t>(a)] < trial.score[static_cast<std::size_t>(b)];
+    }));
+  }
+  return kept;
+}
+
+MarkerChoice ChooseByCore(std::span<const MarkerCandidates> trials,
+                          const MarkerChoiceOptions& options) {
+  const std::size_t n = trials.size();
+  const std::vector<std::size_t> core = CoreOf(trials);
+  std::vector<MarkerCandidates> core_trials;
+  for (const std::size_t i : core) core_trials.push_back(trials[i]);
+  const MarkerChoice of_core = ChooseTogether(core_trials, options);
+  MarkerChoice choice;
+  choice.warnings = of_core.warnings;
+  choice.chosen.resize(n);
+  const std::size_t size = of_core.chosen.front().size();
+  if (size == 0) return choice;
+  const std::vector<CorrelatedTrial> correlated(trials.begin(), trials.end());
+  for (std::size_t k = 0; k < core.size(); ++k) choice.chosen[core[k]] = of_core.chosen[k];
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!choice.chosen[i].empty()) continue;
+    const std::vector<Subset> subsets = AllSubsets(Clearest(trials[i], size), size);
+    std::vector<double> sums(subsets.size(), 0);
+    for (std::size_t k = 0; k < core.size() && subsets.size() > 1; ++k) {
+      PairCorrelator pair(correlated[i], correlated[core[k]], options.points, 1);
+      for (std::size_t s = 0; s < subsets.size(); ++s) {
+        sums[s] += pair.Correlate(subsets[s], of_core.chosen[k]);
+      }
+    }
+    choice.chosen[i] = subsets[static_cast<std::size_t>(std::max_element(sums.begin(), sums.end()) -
+                                                        sums.begin())];
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 1; j < n; ++j) {
+      choice.value += PairCorrelator(correlated[i], correlated[j], options.points, 1)
+                          .Correlate(choice.chosen[i], choice.chosen[j]);
+    }
+  }
+  // No r exceeds 1.
+  const auto pairs = [](std::size_t count) { return static_cast<double>(count * (count - 1) / 2); };
+  choice.bound = of_core.bound + pairs(n) - pairs(core.size());
+  return choice;
+}
+
+}  // namespace
+
+MarkerChoice ChooseJointly(std::span<const MarkerCandidates> trials,
+                           const MarkerChoiceOptions& options) {
+  return trials.size() > kMostTogether ? ChooseByCore(trials, options)
+                                       : ChooseTogether(trials, options);
 }
 
 }  // namespace exemplar::learning

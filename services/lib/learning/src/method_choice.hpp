@@ -23,14 +23,13 @@ inline constexpr const char* kFramesByContactChoice = "frames by contact and len
 Exemplars ExemplarsFor(const std::string& choice, Exemplars exemplars);
 
 /// The model that `choice` names; an unknown text gives the paper's. `exemplars` from ExemplarsFor.
-std::unique_ptr<const Model> FitModel(const std::string& choice, const Exemplars& exemplars,
+std::unique_ptr<const Model> FitModel(const std::string& choice, Exemplars exemplars,
                                       std::shared_ptr<const demonstration::ToolKinematics> tool);
 
-/// Scores by predicting each trial (at most 15 of them, evenly chosen) from the others. Empty where
-/// there is nothing to predict: one trial, or no tool poses. `chosen` is not set. Stops early, with
-/// what it has, when asked.
-std::vector<MethodScore> ScoreMethods(std::span<const std::string> choices,
-                                      const Exemplars& exemplars,
+/// Scores by predicting each trial (at most 15 of them, evenly chosen) from the others (at most a
+/// hundred). Empty where there is nothing to predict, one trial or no tool poses, and when asked to
+/// stop. `chosen` is not set.
+std::vector<MethodScore> ScoreMethods(std::span<const std::string> choices, Exemplars exemplars,
                                       std::shared_ptr<const demonstration::ToolKinematics> tool,
                                       const Progress& progress, const std::stop_token& stop);
 

@@ -3,13 +3,19 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "subsets.hpp"
 
 namespace exemplar::learning {
 namespace {
 
-constexpr std::size_t kMemory = std::size_t{1} << 16;  // stretches remembered; a power of two
+// Stretches remembered, powers of two: of few markers few stretches are alike, and of up to two
+// none are, since all knots bear on each.
+constexpr std::size_t kMemory = std::size_t{1} << 16;
+constexpr std::size_t kMemoryOfFew = std::size_t{1} << 13;
+constexpr std::size_t kFewMarkers = 4;
+constexpr std::size_t kNoneAlike = 2;
 constexpr double kConstant = 1e-12;  // variance of a warped signal of unit variance
 constexpr std::uint16_t kStart = 0xFFFF;
 constexpr std::uint16_t kEnd = 0xFFFE;
@@ -18,6 +24,96 @@ std::uint64_t Mix(std::uint64_t hash, std::uint64_t value) {
   hash = (hash ^ value) * 0x9E3779B97F4A7C15u;
   return hash ^ (hash >> 29);
 }
+
+// A signal under the cubic that warps it on a stretch; the cubic's argument is the part of the
+// stretch, its value counts samples.
+struct WarpedSignal {
+  const CorrelatedTrial::Sample* samples;
+  double cubic[4];
+};
+
+// Points [first, behind) of the grid; point k lies at k * scale + shift of the stretch.
+struct GridPart {
+  int first, behind;
+  double scale, shift;
+};
+
+typedef double Two __attribute__((vector_size(16)));
+typedef double Four __attribute__((vector_size(32)));
+typedef int FourInts __attribute__((vector_size(16)));
+
+#define EXEMPLAR_INLINE inline __attribute__((always_inline))
+
+EXEMPLAR_INLINE double ValueAt(const WarpedSignal& signal, double s) {
+  const double* c = signal.cubic;
+  const double place = c[0] + s * (c[1] + s * (c[2] + s * c[3]));
+  const int at = static_cast<int>(place);
+  return signal.samples[at].value + (place - at) * signal.samples[at].slope;
+}
+
+EXEMPLAR_INLINE void ValuesAt(const WarpedSignal& signal, const Four& s, Four& values) {
+  const double* c = signal.cubic;
+  const Four place = c[0] + s * (c[1] + s * (c[2] + s * c[3]));
+  const FourInts at = __builtin_convertvector(place, FourInts);
+  Two sample[4];
+  for (int i = 0; i < 4; ++i) std::memcpy(&sample[i], &signal.samples[at[i]], sizeof(Two));
+  const Four value = {sample[0][0], sample[1][0], sample[2][0], sample[3][0]};
+  const Four slope = {sample[0][1], sample[1][1], sample[2][1], sample[3][1]};
+  values = value + (place - __builtin_convertvector(at, Four)) * slope;
+}
+
+// Adds to the five sums: of a, b, aa, bb and ab.
+EXEMPLAR_INLINE void AddPointsOf(const WarpedSignal& a, const WarpedSignal& b, const GridPart& part,
+                                 double* sums) {
+  Four in_lanes[5] = {};
+  int k = part.first;
+  for (; k + 4 <= part.behind; k += 4) {
+    const Four point = {k + 0.0, k + 1.0, k + 2.0, k + 3.0};
+    const Four s = point * part.scale + part.shift;
+    Four va, vb;
+    ValuesAt(a, s, va);
+    ValuesAt(b, s, vb);
+    in_lanes[0] += va;
+    in_lanes[1] += vb;
+    in_lanes[2] += va * va;
+    in_lanes[3] += vb * vb;
+    in_lanes[4] += va * vb;
+  }
+  for (int sum = 0; sum < 5; ++sum) {
+    const Four& lanes = in_lanes[sum];
+    sums[sum] += (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+  }
+  for (; k < part.behind; ++k) {
+    const double s = k * part.scale + part.shift;
+    const double va = ValueAt(a, s);
+    const double vb = ValueAt(b, s);
+    sums[0] += va;
+    sums[1] += vb;
+    sums[2] += va * va;
+    sums[3] += vb * vb;
+    sums[4] += va * vb;
+  }
+}
+
+void AddPoints(const WarpedSignal& a, const WarpedSignal& b, const GridPart& part, double* sums) {
+  AddPointsOf(a, b, part, sums);
+}
+#if defined(__x86_64__)
+__attribute__((target("avx2,fma"))) void AddPointsWide(const WarpedSignal& a, const WarpedSignal& b,
+                                                       const GridPart& part, double* sums) {
+  AddPointsOf(a, b, part, sums);
+}
+bool HasWideVectors() {
+  static const bool has = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  return has;
+}
+#else
+void AddPointsWide(const WarpedSignal& a, const WarpedSignal& b, const GridPart& part,
+                   double* sums) {
+  AddPointsOf(a, b, part, sums);
+}
+bool HasWideVectors() { return false; }
+#endif
 
 }  // namespace
 
@@ -42,6 +138,7 @@ CorrelatedTrial::CorrelatedTrial(const MarkerCandidates& trial)
   samples.resize(static_cast<std::size_t>(n));
   for (Eigen::Index k = 0; k < n; ++k) {
     const double slope = k + 1 < n ? signal[k + 1] - signal[k] : 0;
+    // The last has no slope, so that a place at the very end needs no care.
     samples[static_cast<std::size_t>(k)] = {signal[k], slope};
   }
 }
@@ -51,8 +148,8 @@ PairCorrelator::PairCorrelator(const CorrelatedTrial& a, const CorrelatedTrial& 
     : points_(points), step_s_((a.duration_s + b.duration_s) / 2 / (points - 1)) {
   a_.trial = &a;
   b_.trial = &b;
-  const auto wanted = static_cast<std::size_t>(std::min(4 * pairs, 1.0 * kMemory));
-  memory_.resize(std::bit_ceil(std::max<std::size_t>(wanted, 16)));
+  most_remembered_ =
+      std::bit_ceil(static_cast<std::size_t>(std::clamp(4 * pairs, 16.0, 1.0 * kMemory)));
 }
 
 void PairCorrelator::Restart(std::size_t size) {
@@ -66,6 +163,10 @@ void PairCorrelator::Restart(std::size_t size) {
   }
   common_s_.assign(knots, 0);
   upto_.assign(knots, {});
+  if (size > kNoneAlike && memory_.empty()) {
+    memory_.resize(size > kFewMarkers ? most_remembered_
+                                      : std::min(most_remembered_, kMemoryOfFew));
+  }
 }
 
 void PairCorrelator::Limit(Side& side, std::size_t stretch, double next_tangent) {
@@ -124,6 +225,10 @@ double PairCorrelator::Finish(std::size_t size) {
 }
 
 PairCorrelator::Sums PairCorrelator::Stretch(std::size_t stretch) {
+  if (memory_.empty()) {
+    ++computed_;
+    return Compute(stretch);
+  }
   const Key key{
       static_cast<std::uint64_t>(a_.name[stretch]) << 48 |
           static_cast<std::uint64_t>(b_.name[stretch]) << 32 |
@@ -140,57 +245,26 @@ PairCorrelator::Sums PairCorrelator::Stretch(std::size_t stretch) {
   return place.sums;
 }
 
-PairCorrelator::Sums PairCorrelator::Compute(std::size_t stretch) const {
+PairCorrelator::Sums PairCorrelator::Compute(std::size_t stretch) {
   const double from = common_s_[stretch];
   const double width = common_s_[stretch + 1] - from;
   const auto first = static_cast<int>(std::ceil(from / step_s_));
   const bool last = stretch + 2 == common_s_.size();
   const int behind = last ? points_ : static_cast<int>(std::ceil(common_s_[stretch + 1] / step_s_));
-  // The warp of either side as a cubic of the part of the stretch, in samples.
-  struct Cubic {
-    double c0, c1, c2, c3;
-    double At(double s) const { return c0 + s * (c1 + s * (c2 + s * c3)); }
-  };
-  const auto cubic = [&](const Side& side) {
+  const auto warped = [&](const Side& side) {
     const double scale = side.trial->samples_per_s;
     const double y0 = side.own_s[stretch] * scale;
     const double rise = side.own_s[stretch + 1] * scale - y0;
     const double m0 = side.tangent[stretch] * width * scale;
     const double m1 = side.tangent[stretch + 1] * width * scale;
-    return Cubic{y0, m0, 3 * rise - 2 * m0 - m1, m0 + m1 - 2 * rise};
+    return WarpedSignal{side.trial->samples.data(),
+                        {y0, m0, 3 * rise - 2 * m0 - m1, m0 + m1 - 2 * rise}};
   };
-  const auto value = [](const CorrelatedTrial& trial, double place) {
-    const int highest = static_cast<int>(trial.samples.size()) - 2;
-    const int at = std::clamp(static_cast<int>(place), 0, highest);
-    const CorrelatedTrial::Sample& sample = trial.samples[static_cast<std::size_t>(at)];
-    return sample.value + (place - at) * sample.slope;
-  };
-  const Cubic a = cubic(a_);
-  const Cubic b = cubic(b_);
-  const double per_width = 1 / width;
-  Sums sums;
-  // Places first, values after: the first loop is plain arithmetic that the compiler vectorises.
-  constexpr int kBatch = 64;
-  std::array<double, kBatch> a_place;
-  std::array<double, kBatch> b_place;
-  for (int batch = first; batch < behind; batch += kBatch) {
-    const int count = std::min(kBatch, behind - batch);
-    for (int i = 0; i < count; ++i) {
-      const double s = ((batch + i) * step_s_ - from) * per_width;
-      a_place[static_cast<std::size_t>(i)] = a.At(s);
-      b_place[static_cast<std::size_t>(i)] = b.At(s);
-    }
-    for (int i = 0; i < count; ++i) {
-      const double va = value(*a_.trial, a_place[static_cast<std::size_t>(i)]);
-      const double vb = value(*b_.trial, b_place[static_cast<std::size_t>(i)]);
-      sums.a += va;
-      sums.b += vb;
-      sums.aa += va * va;
-      sums.bb += vb * vb;
-      sums.ab += va * vb;
-    }
-  }
-  return sums;
+  computed_points_ += std::max(0, behind - first);
+  std::array<double, 5> sums = {};
+  const GridPart part{first, behind, step_s_ / width, -from / width};
+  (HasWideVectors() ? AddPointsWide : AddPoints)(warped(a_), warped(b_), part, sums.data());
+  return {sums[0], sums[1], sums[2], sums[3], sums[4]};
 }
 
 double PairCorrelator::Correlate(std::span<const int> a_subset, std::span<const int> b_subset) {

@@ -48,6 +48,10 @@ class PairCorrelator {
 
   /// Stretches that were computed, rather than remembered.
   long long computed_stretches() const { return computed_; }
+  /// Points of the grid at which both signals were taken. Each costs 16 multiply-adds: one for its
+  /// part of the stretch, and for either signal three for the cubic and two for the value, then
+  /// five for the sums.
+  long long computed_points() const { return computed_points_; }
 
  private:
   struct Side {
@@ -83,7 +87,7 @@ class PairCorrelator {
   /// Fritsch & Carlson's limit on a stretch, from the tangent that enters and the unlimited next.
   static void Limit(Side& side, std::size_t stretch, double next_tangent);
   Sums Stretch(std::size_t stretch);
-  Sums Compute(std::size_t stretch) const;
+  Sums Compute(std::size_t stretch);
   void Descend(const Walk& walk, std::size_t knot, std::size_t a_from, std::size_t b_from,
                std::size_t a_rank, std::size_t b_rank);
 
@@ -92,8 +96,10 @@ class PairCorrelator {
   double step_s_;
   std::vector<double> common_s_;  // by knot
   std::vector<Sums> upto_;        // by knot: stretches added when the path got there
+  std::size_t most_remembered_ = 0;
   std::vector<Remembered> memory_;
   long long computed_ = 0;
+  long long computed_points_ = 0;
 };
 
 }  // namespace exemplar::learning

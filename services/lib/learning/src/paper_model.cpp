@@ -37,7 +37,7 @@ Eigen::MatrixX3d AsPath(const Eigen::VectorXd& stacked) {
 
 }  // namespace
 
-PaperModel::PaperModel(const Exemplars& exemplars,
+PaperModel::PaperModel(Exemplars exemplars,
                        std::shared_ptr<const demonstration::ToolKinematics> tool)
     : frames_(exemplars.frames),
       joints_count_(exemplars.joints()),
@@ -54,6 +54,7 @@ PaperModel::PaperModel(const Exemplars& exemplars,
     const ExemplarTrial& trial = exemplars.trials[static_cast<std::size_t>(j)];
     joints.col(j) = trial.joints.reshaped();
     if (has_hand) hand.col(j) = trial.hand;
+    exemplars.trials.DropJoints(static_cast<std::size_t>(j));
   }
   joints_ = Streams(joints);
   hand_ = Streams(hand);
@@ -87,9 +88,20 @@ PaperModel::PaperModel(const Exemplars& exemplars,
   blends_ = through_joints_ || rbf_->rank() < 3;
 
   // Standard error from the closed-form leave-one-out residuals of the path.
-  const Eigen::MatrixXd residuals = rbf_->LeaveOneOut(paths.transpose());
-  const Eigen::VectorXd squared = residuals.colwise().squaredNorm().transpose() / n;
-  left_out_variance_ = AsPath(squared).rowwise().sum();
+  left_out_variance_ = Eigen::VectorXd::Zero(frames_);
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(n);
+  for (int i = 0; i < frames_; ++i) {
+    Eigen::MatrixXd at_frame(n, 3);
+    for (int axis = 0; axis < 3; ++axis) {
+      at_frame.col(axis) = paths.row(axis * frames_ + i).transpose();
+    }
+    const Eigen::VectorXd squared = rbf_->LeaveOneOut(at_frame).rowwise().squaredNorm();
+    left_out_variance_[i] = squared.sum() / n;
+    largest = largest.cwiseMax(squared);
+  }
+  for (int j = 0; j < n; ++j) {
+    left_out_.push_back({std::sqrt(largest[j]), std::sqrt(rbf_->LeftOutVariance(j))});
+  }
 }
 
 Eigen::VectorXd PaperModel::Weights(const Situation& situation) const {

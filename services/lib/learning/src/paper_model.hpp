@@ -17,9 +17,11 @@ namespace exemplar::learning {
 class PaperModel final : public Model {
  public:
   /// `tool` may be null; else exemplars.joint_names are its joints (or there are none).
-  PaperModel(const Exemplars& exemplars, std::shared_ptr<const demonstration::ToolKinematics> tool);
+  /// Gives the trials' joints up as it takes them over, where nobody else holds them.
+  PaperModel(Exemplars exemplars, std::shared_ptr<const demonstration::ToolKinematics> tool);
 
   Prediction Predict(const Situation& situation) const override;
+  std::vector<LeftOutTrial> LeftOut() const override { return left_out_; }
   /// The absolute solution's tool path alone: Fig. 10's error grows on it. Empty without poses.
   std::vector<geometry::Pose> AbsolutePath(const Situation& situation) const;
   /// False: the trials have no joints and the blend changes nothing.
@@ -45,6 +47,7 @@ class PaperModel final : public Model {
   Eigen::VectorXd upsilon_;            // of the target
   Eigen::MatrixXd objectivity_;        // frames x objects
   Eigen::VectorXd left_out_variance_;  // m^2 a frame
+  std::vector<LeftOutTrial> left_out_;
 };
 
 }  // namespace exemplar::learning

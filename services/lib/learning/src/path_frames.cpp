@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "exemplar/base/text.hpp"
 
@@ -15,10 +16,7 @@ constexpr double kObjectGain = 1e5;
 // The best gains are averaged with shares that fall with this power of their left-out score.
 constexpr std::size_t kMembers = 8;
 constexpr double kSharpness = 16;
-// Gains are chosen on at most this many trials and frames; the answer uses all. Many trials leave
-// less to choose.
-constexpr int kMostForChoice = 40;
-constexpr Eigen::Index kFramesForChoice = 150;
+// Many trials leave less to choose.
 constexpr int kManyTrials = 30;
 constexpr std::size_t kMembersOfMany = 2;
 
@@ -49,7 +47,7 @@ PathFrames::PathFrames(const Exemplars& exemplars) : target_(exemplars.target) {
   for (const ExemplarTrial& trial : exemplars.trials) {
     mean_start_ += trial.tool.front().translation / n;
   }
-  values_.resize(3 * n, exemplars.frames);
+  Eigen::MatrixXd values(3 * n, exemplars.frames);  // x - O
   double squared = 0;
   double extent = 0;
   for (int j = 0; j < n; ++j) {
@@ -58,14 +56,14 @@ PathFrames::PathFrames(const Exemplars& exemplars) : target_(exemplars.target) {
     situation.start = trial.tool.front().translation;
     const Eigen::MatrixXd path =
         target_ >= 0 ? exemplars.ShiftedPath(j, target_) : exemplars.BasePath(j);
-    values_.middleRows<3>(3 * j) = path.transpose();
-    if (target_ < 0) values_.middleRows<3>(3 * j).colwise() -= mean_start_;
+    values.middleRows<3>(3 * j) = path.transpose();
+    if (target_ < 0) values.middleRows<3>(3 * j).colwise() -= mean_start_;
     squared += (situation.start - situation.object).squaredNorm() / n;
     extent = std::max(extent, (path.rowwise() - path.row(0)).rowwise().norm().maxCoeff());
     situations_.push_back(situation);
   }
   length_m_ = std::max({std::sqrt(squared), 0.05 * extent, 1e-9});
-  Fit(Grid(turns_));
+  Fit(Grid(turns_), std::move(values));
 }
 
 FrameSituation PathFrames::From(const Situation& situation) const {
@@ -100,13 +98,16 @@ PathFrames::Likeness PathFrames::Compare(const FrameSituation& a, const FrameSit
   return likeness;
 }
 
+double PathFrames::Similarity(const Likeness& likeness, const FrameGains& gains) {
+  return gains.residual * (gains.by_orientation ? likeness.by_place_and_turn : likeness.by_place);
+}
+
 Eigen::Matrix3d PathFrames::Covariance(const Likeness& likeness, const FrameGains& gains) {
   Eigen::Matrix3d block = likeness.always;
   if (gains.start_axes > 0) block += gains.start_axes * likeness.along_axes;
   if (gains.world > 0) block.diagonal().array() += gains.world;
   if (gains.residual > 0) {
-    const double similarity =
-        gains.residual * (gains.by_orientation ? likeness.by_place_and_turn : likeness.by_place);
+    const double similarity = Similarity(likeness, gains);
     if (gains.residual_turns) {
       block += similarity * likeness.turn;
     } else {
@@ -116,41 +117,48 @@ Eigen::Matrix3d PathFrames::Covariance(const Likeness& likeness, const FrameGain
   return block;
 }
 
-void PathFrames::Fit(const std::vector<FrameGains>& grid) {
-  const int n = static_cast<int>(situations_.size());
-  const auto covariance = [&](const std::vector<int>& chosen, const FrameGains& gains) {
-    const auto m = static_cast<Eigen::Index>(chosen.size());
-    Eigen::MatrixXd matrix(3 * m, 3 * m);
+PartedCovariance PathFrames::Parted(const std::vector<int>& chosen, const FrameGains& gains) const {
+  PartedCovariance covariance;
+  const auto m = static_cast<Eigen::Index>(chosen.size());
+  const Eigen::Index columns = 4 + (gains.start_axes > 0 ? 3 : 0) + (gains.world > 0 ? 3 : 0);
+  covariance.parts.resize(3 * m, columns);
+  const auto situation = [&](Eigen::Index i) -> const FrameSituation& {
+    return situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])];
+  };
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const FrameSituation& s = situation(i);
+    const Eigen::Vector3d from = (s.start - s.object) / length_m_;
+    auto rows = covariance.parts.middleRows<3>(3 * i);
+    rows.col(0) = std::sqrt(kStartGain) * from;
+    rows.middleCols<3>(1) = std::sqrt(kObjectGain) * s.turn;
+    Eigen::Index next = 4;
+    if (gains.start_axes > 0) {
+      const Eigen::Vector3d along = s.turn.transpose() * from;
+      rows.middleCols<3>(next) = std::sqrt(gains.start_axes) * s.turn * along.asDiagonal();
+      next += 3;
+    }
+    if (gains.world > 0) {
+      rows.middleCols<3>(next) = std::sqrt(gains.world) * Eigen::Matrix3d::Identity();
+    }
+    if (gains.residual > 0 && gains.residual_turns) covariance.turns.push_back(s.turn);
+  }
+  if (gains.residual > 0) {
+    covariance.similarity.resize(m, m);
     for (Eigen::Index i = 0; i < m; ++i) {
       for (Eigen::Index j = i; j < m; ++j) {
-        const Eigen::Matrix3d block = Covariance(
-            Compare(situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])],
-                    situations_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(j)])]),
-            gains);
-        matrix.block<3, 3>(3 * i, 3 * j) = block;
-        matrix.block<3, 3>(3 * j, 3 * i) = block.transpose();
+        covariance.similarity(i, j) = covariance.similarity(j, i) =
+            Similarity(Compare(situation(i), situation(j)), gains);
       }
     }
-    return matrix;
-  };
-  std::vector<int> all;
-  for (int j = 0; j < n; ++j) all.push_back(j);
-  std::vector<int> few = all;
-  if (n > kMostForChoice) {
-    few.clear();
-    for (int k = 0; k < kMostForChoice; ++k) few.push_back(k * n / kMostForChoice);
   }
-  const Eigen::Index columns = std::min(values_.cols(), kFramesForChoice);
-  Eigen::MatrixXd few_values(3 * static_cast<Eigen::Index>(few.size()), columns);
-  for (std::size_t k = 0; k < few.size(); ++k) {
-    for (Eigen::Index c = 0; c < columns; ++c) {
-      // The first and the last frame are among them.
-      const Eigen::Index frame = columns > 1 ? c * (values_.cols() - 1) / (columns - 1) : 0;
-      few_values.block<3, 1>(3 * static_cast<Eigen::Index>(k), c) =
-          values_.block<3, 1>(3 * few[k], frame);
-    }
-  }
+  return covariance;
+}
 
+void PathFrames::Fit(const std::vector<FrameGains>& grid, Eigen::MatrixXd values) {
+  const int n = static_cast<int>(situations_.size());
+  const std::vector<int> all = EvenChoice(n, n);
+  const std::vector<int> few = EvenChoice(n, kMostForChoice);
+  const Eigen::MatrixXd few_values = FramesForChoice(values, few);
   struct Candidate {
     double score = 0;
     const FrameGains* gains = nullptr;
@@ -158,9 +166,12 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
   std::vector<Candidate> candidates;
   for (const FrameGains& gains : grid) {
     // One trial predicts nothing about itself: the plainest gains.
-    const double score =
-        n > 1 ? LeftOutScore(BlockKriging(covariance(few, gains), few_values).left_out_errors())
-              : 1.0;
+    double score = 1;
+    if (n > 1) {
+      Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(few_values.rows(), few_values.cols());
+      BlockKriging(Parted(few, gains)).AddLeftOutErrors(few_values, 1, errors);
+      score = LeftOutScore(errors);
+    }
     candidates.push_back({score, &gains});
     if (n == 1) break;
   }
@@ -168,35 +179,49 @@ void PathFrames::Fit(const std::vector<FrameGains>& grid) {
                    [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
   const std::size_t members = n > kManyTrials ? kMembersOfMany : kMembers;
   if (candidates.size() > members) candidates.resize(members);
+  std::vector<double> shares;
   double total = 0;
   for (const Candidate& candidate : candidates) {
     const double ratio = candidate.score > 0 ? candidates.front().score / candidate.score : 1.0;
-    const double share = std::pow(ratio, kSharpness);
-    total += share;
-    members_.push_back({.gains = *candidate.gains,
-                        .share = share,
-                        .kriging = BlockKriging(covariance(all, *candidate.gains), values_),
-                        .inverse = {}});
-    members_.back().inverse = Streams(members_.back().kriging.inverse());
+    shares.push_back(std::pow(ratio, kSharpness));
+    total += shares.back();
   }
-  paths_ = Streams(values_.transpose());
-  Eigen::MatrixXd noise(values_.cols(), static_cast<Eigen::Index>(members_.size()));
-  for (std::size_t k = 0; k < members_.size(); ++k) {
-    noise.col(static_cast<Eigen::Index>(k)) = members_[k].kriging.noise_variance();
+  Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(values.rows(), values.cols());
+  Eigen::MatrixXd noise(values.cols(), static_cast<Eigen::Index>(candidates.size()));
+  left_out_spread_ = Eigen::VectorXd::Zero(n);
+  start_share_ = Eigen::VectorXd::Zero(values.cols());
+  Eigen::VectorXd from(3 * static_cast<Eigen::Index>(n));
+  for (int j = 0; j < n; ++j) {
+    const FrameSituation& s = situations_[static_cast<std::size_t>(j)];
+    from.segment<3>(3 * j) = (s.start - s.object) / length_m_;
+  }
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const FrameGains& gains = *candidates[k].gains;
+    Member member{.gains = gains,
+                  .share = shares[k] / total,
+                  .kriging = BlockKriging(Parted(all, gains)),
+                  .inverse = {}};
+    noise.col(static_cast<Eigen::Index>(k)) =
+        member.kriging.AddLeftOutErrors(values, member.share, errors);
+    for (int j = 0; j < n; ++j) {
+      left_out_spread_[j] += member.share * member.kriging.LeftOutSpread(j);
+    }
+    member.inverse = Streams(member.kriging.inverse());
+    // Posterior means of a, and of A's trace over 3.
+    start_share_ += member.share * (kStartGain + gains.start_axes / 3) *
+                    (values.transpose() * member.kriging.Duals(from));
+    members_.push_back(std::move(member));
   }
   noise_ = Streams(noise);
-  start_share_ = Eigen::VectorXd::Zero(values_.cols());
-  for (Member& member : members_) {
-    member.share /= total;
-    // Posterior means of a, and of A's trace over 3.
-    const Eigen::MatrixXd duals = member.kriging.Duals(values_);
-    for (int j = 0; j < n; ++j) {
-      const FrameSituation& s = situations_[static_cast<std::size_t>(j)];
-      const Eigen::Vector3d from = (s.start - s.object) / length_m_;
-      start_share_ += member.share * (kStartGain + member.gains.start_axes / 3) *
-                      (from.transpose() * duals.middleRows<3>(3 * j)).transpose();
-    }
+  left_out_distance_m_.resize(n);
+  for (int j = 0; j < n; ++j) {
+    left_out_distance_m_[j] =
+        std::sqrt(errors.middleRows<3>(3 * j).colwise().squaredNorm().maxCoeff());
   }
+  left_out_ = values - errors;
+  errors.resize(0, 0);
+  values.transposeInPlace();
+  paths_ = Streams(values);
   // Where starts and objects never varied apart, the parts share what they explain: relative to the
   // first frame, which is the start's altogether, the shape is still right.
   const double first = start_share_[0];
@@ -220,7 +245,9 @@ PathFrames::Answer PathFrames::Predict(const FrameSituation& situation) const {
       cross.middleRows<3>(3 * j) =
           Covariance(likeness[static_cast<std::size_t>(j)], member.gains).transpose();
     }
-    const Eigen::MatrixX3d own = member.inverse.Sum3(cross);
+    const Eigen::MatrixX3d own = member.inverse.count() > 0
+                                     ? member.inverse.Sum3(cross)
+                                     : Eigen::MatrixX3d(member.kriging.Duals(cross));
     weights += member.share * own;
     const double known = Covariance(self, member.gains).trace() - own.cwiseProduct(cross).sum();
     noise[static_cast<Eigen::Index>(k)] = member.share * (3 + std::max(0.0, known));
@@ -233,20 +260,14 @@ PathFrames::Answer PathFrames::Predict(const FrameSituation& situation) const {
 }
 
 Eigen::Matrix3Xd PathFrames::LeftOut(int trial) const {
-  Eigen::Matrix3Xd path = values_.middleRows<3>(3 * trial);
-  for (const Member& member : members_) {
-    path -= member.share * member.kriging.left_out_errors().middleRows<3>(3 * trial);
-  }
+  Eigen::Matrix3Xd path = left_out_.middleRows<3>(3 * trial);
   path.colwise() += situations_[static_cast<std::size_t>(trial)].object;
   return path;
 }
 
 Eigen::Vector3d PathFrames::LeftOut(int trial, int frame) const {
-  Eigen::Vector3d place = values_.block<3, 1>(3 * trial, frame);
-  for (const Member& member : members_) {
-    place -= member.share * member.kriging.left_out_errors().block<3, 1>(3 * trial, frame);
-  }
-  return place + situations_[static_cast<std::size_t>(trial)].object;
+  return left_out_.block<3, 1>(3 * trial, frame) +
+         situations_[static_cast<std::size_t>(trial)].object;
 }
 
 std::string PathFrames::Describe() const {

@@ -48,6 +48,13 @@ class PathFrames {
   /// What a trial of the training set is predicted from the others, 3 x frames: closed form.
   Eigen::Matrix3Xd LeftOut(int trial) const;
   Eigen::Vector3d LeftOut(int trial, int frame) const;
+  /// The deviation that its error should have, in units of the noise.
+  double LeftOutSpread(int trial) const { return left_out_spread_[trial]; }
+  int size() const { return static_cast<int>(situations_.size()); }
+  /// Frees the left-out paths: LeftOut must not be called again.
+  void ForgetLeftOut() { left_out_.resize(0, 0); }
+  /// The largest distance (m) between a trial and what is predicted from the others.
+  double LeftOutDistance(int trial) const { return left_out_distance_m_[trial]; }
 
   /// a(t) / a(0), clamped to [0, 1]: 1 in the start's frame, 0 in the object's.
   const Eigen::VectorXd& start_share() const { return start_share_; }
@@ -69,24 +76,28 @@ class PathFrames {
     double by_place_and_turn = 0;
   };
   Likeness Compare(const FrameSituation& a, const FrameSituation& b) const;
+  static double Similarity(const Likeness& likeness, const FrameGains& gains);
   static Eigen::Matrix3d Covariance(const Likeness& likeness, const FrameGains& gains);
-  void Fit(const std::vector<FrameGains>& grid);
+  PartedCovariance Parted(const std::vector<int>& chosen, const FrameGains& gains) const;
+  void Fit(const std::vector<FrameGains>& grid, Eigen::MatrixXd values);
 
   int target_ = -1;
   bool turns_ = false;   // the target's orientation is known
   double length_m_ = 1;  // mean distance from start to object: the unit of lengths
   Eigen::Vector3d mean_start_ = Eigen::Vector3d::Zero();
   std::vector<FrameSituation> situations_;
-  Eigen::MatrixXd values_;  // 3n x frames: x - O
   struct Member {
     FrameGains gains;
     double share = 0;
     BlockKriging kriging;
-    Streams inverse;  // kriging's, for queries
+    Streams inverse;  // kriging's, for queries; empty where the trials are many
   };
   std::vector<Member> members_;
-  Streams paths_;  // values_, a row of it a column
-  Streams noise_;  // variance of each member's noise at each frame (m^2)
+  Eigen::MatrixXd left_out_;  // 3n x frames: x - O as the others predict it
+  Eigen::VectorXd left_out_distance_m_;
+  Eigen::VectorXd left_out_spread_;  // one a trial
+  Streams paths_;                    // x - O, a coordinate of a trial a column
+  Streams noise_;                    // variance of each member's noise at each frame (m^2)
   Eigen::VectorXd start_share_;
 };
 

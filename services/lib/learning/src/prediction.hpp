@@ -21,11 +21,19 @@ struct Prediction {
   std::vector<std::string> warnings;
 };
 
+/// How well the others predict a trial, in closed form.
+struct LeftOutTrial {
+  double distance_m = 0;  ///< the largest between its path and theirs at the same frame
+  double spread = 1;      ///< how large errors are at its place, beside other places
+};
+
 /// A way to answer. Implementations are immutable, so thread-safe.
 class Model {
  public:
   virtual ~Model() = default;
   virtual Prediction Predict(const Situation& situation) const = 0;
+  /// One a trial. Empty without tool poses.
+  virtual std::vector<LeftOutTrial> LeftOut() const = 0;
 };
 
 /// Rotations of the trials about their mean at each frame, so that a weighted rotation is a

@@ -67,9 +67,12 @@ std::vector<double> Phase(const Exemplars& exemplars, const ExemplarTrial& trial
 }  // namespace
 
 ExemplarTrial Rewarped(const ExemplarTrial& trial, std::span<const double> from) {
-  ExemplarTrial result = trial;
+  ExemplarTrial result;
+  result.situation = trial.situation;
+  result.own_contacts = trial.own_contacts;
   const auto sample = [&](const std::vector<geometry::Pose>& path) {
     std::vector<geometry::Pose> sampled;
+    sampled.reserve(from.size());
     for (const double at : from) {
       const double whole = std::clamp(std::floor(at), 0.0, static_cast<double>(path.size() - 1));
       const auto k = static_cast<std::size_t>(whole);
@@ -93,10 +96,10 @@ ExemplarTrial Rewarped(const ExemplarTrial& trial, std::span<const double> from)
     return sampled;
   };
   if (!trial.tool.empty()) result.tool = sample(trial.tool);
-  for (std::vector<geometry::Pose>& path : result.moving) {
-    if (!path.empty()) path = sample(path);
+  for (const std::vector<geometry::Pose>& path : trial.moving) {
+    result.moving.push_back(path.empty() ? path : sample(path));
   }
-  if (trial.joints.cols() > 0) result.joints = mix(trial.joints);
+  result.joints = trial.joints.cols() > 0 ? mix(trial.joints) : trial.joints;
   if (trial.hand.size() > 0) result.hand = mix(trial.hand);
   if (trial.touch_n.size() > 0) result.touch_n = mix(trial.touch_n);
   result.own_time = mix(trial.own_time);
@@ -146,7 +149,7 @@ bool AlignKnots(const std::vector<std::vector<double>>& knots, Exemplars& exempl
   for (std::size_t j = 0; j < knots.size(); ++j) {
     std::vector<double> from;
     for (const double frame : all) from.push_back(Lookup(mean, knots[j], frame));
-    exemplars.trials[j] = Rewarped(exemplars.trials[j], from);
+    exemplars.trials.Replace(j, Rewarped(exemplars.trials[j], from));
   }
   return true;
 }
@@ -171,10 +174,9 @@ void AlignTouches(Exemplars& exemplars) {
   AlignKnots(knots, exemplars);
 }
 
-Exemplars AlignedAtContacts(const Exemplars& exemplars) {
-  Exemplars result = exemplars;
+Exemplars AlignedAtContacts(Exemplars exemplars) {
   const std::size_t count = exemplars.trials[0].own_contacts.size();
-  if (count == 0) return result;
+  if (count == 0) return exemplars;
   // Ends that the trials reach with the recording are knots already.
   const double end = exemplars.frames - 1;
   std::vector<std::vector<double>> knots(exemplars.trials.size(), {0.0});
@@ -194,16 +196,15 @@ Exemplars AlignedAtContacts(const Exemplars& exemplars) {
     }
   }
   for (std::vector<double>& own : knots) own.push_back(end);
-  if (knots.front().size() == 2 || !AlignKnots(knots, result)) return result;
-  SetMeanSpans(result);
-  for (ContactSpan& contact : result.contacts) contact.at_one_time = true;
-  return result;
+  if (knots.front().size() == 2 || !AlignKnots(knots, exemplars)) return exemplars;
+  SetMeanSpans(exemplars);
+  for (ContactSpan& contact : exemplars.contacts) contact.at_one_time = true;
+  return exemplars;
 }
 
-Exemplars AlignedByLength(const Exemplars& exemplars) {
-  Exemplars result = exemplars;
+Exemplars AlignedByLength(Exemplars exemplars) {
   const int n = exemplars.frames;
-  if (!exemplars.has_tool || n < 3) return result;
+  if (!exemplars.has_tool || n < 3) return exemplars;
   const std::vector<double> all = Frames(n);
   std::vector<std::vector<double>> phases;
   // Mean time of each phase, on a grid as fine as the frames.
@@ -223,10 +224,10 @@ Exemplars AlignedByLength(const Exemplars& exemplars) {
     }
     from.front() = 0;
     from.back() = n - 1;
-    result.trials[j] = Rewarped(exemplars.trials[j], from);
+    exemplars.trials.Replace(j, Rewarped(exemplars.trials[j], from));
   }
-  SetMeanSpans(result);
-  return result;
+  SetMeanSpans(exemplars);
+  return exemplars;
 }
 
 }  // namespace exemplar::learning

@@ -17,11 +17,11 @@ void AlignTouches(Exemplars& exemplars);
 
 /// Brings each trial's own contact windows onto their mean, so that all rest at the object at the
 /// same frames. As it was where the contacts come from touch, or there is none.
-Exemplars AlignedAtContacts(const Exemplars& exemplars);
+Exemplars AlignedAtContacts(Exemplars exemplars);
 
 /// Brings the trials to the same part of their way (mostly path length, partly time, between
 /// contacts), at the mean time of that part: people who pause at different places are then compared
 /// where they are, not when. Contacts keep their frames.
-Exemplars AlignedByLength(const Exemplars& exemplars);
+Exemplars AlignedByLength(Exemplars exemplars);
 
 }  // namespace exemplar::learning

@@ -25,9 +25,14 @@ class RotationFrames {
   bool assumed() const { return assumed_; }
 
  private:
-  struct Fitted;
-  /// The covariance of two trials is kStartGain start_a start_b^T and this on the diagonal.
-  double Diagonal(const FrameSituation& a, const FrameSituation& b, double residual) const;
+  struct Candidate;
+  /// The covariance of two trials is kStartGain start_a start_b^T and kConstantGain and this on the
+  /// diagonal.
+  double Similarity(const FrameSituation& a, const FrameSituation& b, double residual) const;
+  PartedCovariance Parted(const std::vector<int>& chosen,
+                          const Eigen::Ref<const Eigen::VectorXd>& first, double residual) const;
+  /// Sets mean_, and returns the trials' rotation vectors from it, 3n x frames.
+  Eigen::MatrixXd RotationVectors(const Exemplars& exemplars, bool with_object);
 
   bool with_object_ = false;
   bool assumed_ = false;

@@ -5,7 +5,9 @@
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/learning/touch.hpp"
+#include "exemplar/signal/statistics.hpp"
 #include "frames_model.hpp"
+#include "freed_memory.hpp"
 #include "method_choice.hpp"
 #include "paper_model.hpp"
 #include "skill_data.hpp"
@@ -129,6 +131,36 @@ std::string Choose(Method method, const Exemplars& exemplars, std::vector<Method
   return best.method;
 }
 
+// Where each trial was predicted anew by the others, by that; else by the closed form.
+void NoteOutliers(const Skill::Data& data, SkillReport& report) {
+  constexpr std::size_t kLeast = 4;
+  constexpr double kRounding_m = 1e-6;
+  const std::vector<LeftOutTrial> left_out = data.model->LeftOut();
+  if (left_out.size() < kLeast) return;
+  std::vector<double> distances_m;
+  for (const LeftOutTrial& trial : left_out) distances_m.push_back(trial.distance_m);
+  for (const MethodScore& score : report.methods) {
+    if (score.chosen && score.frechet_by_trial_m.size() == report.trials.size()) {
+      distances_m = score.frechet_by_trial_m;
+    }
+  }
+  const double median_m = signal::Quantile(distances_m, 0.5);
+  // A trial at the edge of the others is predicted worse without being worse.
+  std::vector<double> in_spreads;
+  for (std::size_t j = 0; j < left_out.size(); ++j) {
+    in_spreads.push_back(distances_m[j] / left_out[j].spread);
+  }
+  // An outlier spoils what is said of its neighbours, who are not named for it.
+  const double least = std::max(kOutlierFactor * signal::Quantile(in_spreads, 0.5),
+                                *std::max_element(in_spreads.begin(), in_spreads.end()) / 2);
+  for (std::size_t j = 0; j < left_out.size(); ++j) {
+    if (in_spreads[j] <= least || distances_m[j] <= median_m + kRounding_m) continue;
+    report.trials[j].notes.push_back("outlier: the others predict it " +
+                                     FormatFixed(distances_m[j], 3) + " m away, the median is " +
+                                     FormatFixed(median_m, 3) + " m");
+  }
+}
+
 // What the model did with the trials, and trials that do not fit the others.
 void ReportModel(const Skill::Data& data, SkillReport& report) {
   if (const auto* frames = dynamic_cast<const FramesModel*>(data.model.get())) {
@@ -140,21 +172,11 @@ void ReportModel(const Skill::Data& data, SkillReport& report) {
           "RBF on paths");
     }
   }
-  for (const MethodScore& score : report.methods) {
-    const auto n = score.frechet_by_trial_m.size();
-    if (!score.chosen || n < 4 || n != report.trials.size()) continue;
-    for (std::size_t j = 0; j < n; ++j) {
-      if (score.frechet_by_trial_m[j] > kOutlierFactor * score.frechet_m) {
-        report.trials[j].notes.push_back(
-            "outlier: the others predict it " + FormatFixed(score.frechet_by_trial_m[j], 3) +
-            " m away, the median is " + FormatFixed(score.frechet_m, 3) + " m");
-      }
-    }
-  }
+  NoteOutliers(data, report);
   std::size_t with_touch = 0;
   std::vector<bool> touched;
-  for (const ExemplarTrial& trial : data.exemplars->trials) {
-    touched.push_back(trial.touch_n.size() > 0 && !FindTouches(trial.touch_n).empty());
+  for (const AlignedTrial& trial : data.alignment->trials) {
+    touched.push_back(trial.own.touch_n.size() > 0 && !FindTouches(trial.own.touch_n).empty());
     if (touched.back()) ++with_touch;
   }
   for (std::size_t j = 0; with_touch > 0 && j < touched.size(); ++j) {
@@ -185,20 +207,22 @@ std::shared_ptr<Skill::Data> MakeSkillData(
   data->alignment = std::move(alignment);
   data->tool = std::move(tool);
   data->choice = std::move(choice);
-  data->exemplars =
-      std::make_shared<const Exemplars>(ExemplarsFor(data->choice, std::move(exemplars)));
-  data->model = FitModel(data->choice, *data->exemplars, data->tool);
-  for (int o = 0; o < data->exemplars->objects(); ++o) {
+  exemplars = ExemplarsFor(data->choice, std::move(exemplars));
+  for (int o = 0; o < exemplars.objects(); ++o) {
     std::vector<Eigen::Quaterniond> rotations;
-    for (const ExemplarTrial& trial : data->exemplars->trials) {
+    for (const ExemplarTrial& trial : exemplars.trials) {
       rotations.push_back(trial.situation.base_T_object[static_cast<std::size_t>(o)].rotation);
     }
     data->mean_object_rotation.push_back(geometry::MeanRotation(rotations));
   }
-  for (const ContactSpan& contact : data->exemplars->contacts) {
-    data->contact_points.push_back(
-        data->exemplars->has_tool ? MeanContactPoint(*data->exemplars, contact) : ContactPoint{});
+  for (const ContactSpan& contact : exemplars.contacts) {
+    data->contact_points.push_back(exemplars.has_tool ? MeanContactPoint(exemplars, contact)
+                                                      : ContactPoint{});
   }
+  data->exemplars = std::make_shared<const Exemplars>(exemplars.SituationsOnly());
+  exemplars.DropTimes();
+  ReturnFreedMemory();
+  data->model = FitModel(data->choice, std::move(exemplars), data->tool);
   return data;
 }
 
@@ -250,13 +274,17 @@ Result<Skill> LearnSkill(std::span<const NamedTrial> trials, const LearnOptions&
                          alignment->warnings.end());
   Exemplars exemplars = BuildExemplars(*alignment, options.target, tool.get());
   NameTarget(exemplars, report);
+  const std::vector<std::string> choices = ChoicesOf(options.method, exemplars);
+  report.joint_names = exemplars.joint_names;
+  // Scoring gives up what it no longer needs; what the model needs is then made again.
   report.methods = ScoreMethods(
-      ChoicesOf(options.method, exemplars), exemplars, tool,
+      choices, std::move(exemplars), tool,
       [&](double fraction, std::string_view step) { tell(0.7 + 0.3 * fraction, step); }, stop);
   if (stop.stop_requested()) return Cancelled();
+  ReturnFreedMemory();
+  exemplars = BuildExemplars(*alignment, options.target, tool.get());
   const std::string choice = Choose(options.method, exemplars, report.methods);
   report.method = choice.substr(0, choice.find(' '));
-  report.joint_names = exemplars.joint_names;
 
   std::shared_ptr<Skill::Data> data =
       MakeSkillData(std::move(report), alignment, std::move(exemplars), choice, tool);

@@ -107,8 +107,7 @@ json FromAlignment(const Alignment& alignment) {
                       {"own", FromUniform(trial.own)},
                       {"segmentation", FromSegmentation(trial.segmentation)},
                       {"chosen", trial.chosen},
-                      {"own_knots_s", trial.own_knots_s},
-                      {"warped", FromUniform(trial.warped)}});
+                      {"own_knots_s", trial.own_knots_s}});
   }
   return {{"time_s", alignment.time_s},
           {"knots_s", alignment.knots_s},
@@ -131,8 +130,7 @@ Alignment ToAlignment(const json& j) {
                                 .own = ToUniform(trial.at("own")),
                                 .segmentation = ToSegmentation(trial.at("segmentation")),
                                 .chosen = trial.at("chosen").get<std::vector<int>>(),
-                                .own_knots_s = ToNumbers(trial.at("own_knots_s")),
-                                .warped = ToUniform(trial.at("warped"))});
+                                .own_knots_s = ToNumbers(trial.at("own_knots_s"))});
   }
   alignment.canonical_joints = ToMatrix(j.at("canonical_joints"));
   alignment.canonical_tool = ToMatrix(j.at("canonical_tool"));
@@ -247,28 +245,39 @@ SkillReport ToReport(const json& j) {
   return report;
 }
 
+bool Increases(const std::vector<double>& values) {
+  for (std::size_t k = 1; k < values.size(); ++k) {
+    if (!(values[k] > values[k - 1])) return false;
+  }
+  return values.size() >= 2;
+}
+
+// What warping a trial and comparing it with the others takes for granted.
+bool Fits(const AlignedTrial& trial, const Alignment& alignment) {
+  const UniformTrial& first = alignment.trials.front().own;
+  const UniformTrial& own = trial.own;
+  const std::size_t frames = own.time_s.size();
+  const auto rows = static_cast<Eigen::Index>(frames);
+  bool good = Increases(own.time_s) && Increases(trial.own_knots_s) &&
+              trial.own_knots_s.size() == alignment.knots_s.size() &&
+              own.joint_names == first.joint_names && own.object_names == first.object_names &&
+              own.base_T_tool.empty() == first.base_T_tool.empty() &&
+              own.hand_open.empty() == first.hand_open.empty() &&
+              (own.base_T_tool.empty() || own.base_T_tool.size() == frames) &&
+              (own.hand_open.empty() || own.hand_open.size() == frames) &&
+              own.joints.cols() == static_cast<Eigen::Index>(own.joint_names.size()) &&
+              own.joints.rows() == rows && (own.touch_n.size() == 0 || own.touch_n.size() == rows);
+  for (const PosePath& path : own.base_T_object) good = good && path.size() == frames;
+  return good;
+}
+
 Status CheckShapes(const Alignment& alignment) {
-  if (alignment.trials.empty() || alignment.time_s.size() < 2) {
+  if (alignment.trials.empty() || !Increases(alignment.time_s) || !Increases(alignment.knots_s) ||
+      alignment.canonical_joints.rows() != static_cast<Eigen::Index>(alignment.time_s.size())) {
     return Error{ErrorCode::kDataLoss, "skill JSON: alignment holds no motion", "alignment"};
   }
-  const std::size_t frames = alignment.time_s.size();
-  const UniformTrial& first = alignment.trials.front().warped;
   for (const AlignedTrial& trial : alignment.trials) {
-    const UniformTrial& warped = trial.warped;
-    bool good =
-        warped.time_s.size() == frames && warped.joint_names == first.joint_names &&
-        warped.object_names == first.object_names &&
-        warped.base_T_tool.size() == first.base_T_tool.size() &&
-        warped.hand_open.size() == first.hand_open.size() &&
-        (warped.base_T_tool.empty() || warped.base_T_tool.size() == frames) &&
-        (warped.hand_open.empty() || warped.hand_open.size() == frames) &&
-        warped.joints.cols() == static_cast<Eigen::Index>(warped.joint_names.size()) &&
-        (warped.joint_names.empty() || warped.joints.rows() == static_cast<Eigen::Index>(frames)) &&
-        (warped.touch_n.size() == 0 || warped.touch_n.size() == static_cast<Eigen::Index>(frames));
-    for (const std::vector<geometry::Pose>& path : warped.base_T_object) {
-      good = good && path.size() == frames;
-    }
-    if (!good) {
+    if (!Fits(trial, alignment)) {
       return Error{ErrorCode::kDataLoss,
                    "skill JSON: trial \"" + trial.id + "\" does not fit the others", "alignment"};
     }
@@ -329,7 +338,7 @@ Result<Skill> SkillFromJson(const json& stored,
     SkillReport report = ToReport(stored.at("report"));
     auto alignment = std::make_shared<const Alignment>(ToAlignment(stored.at("alignment")));
     if (const Status good = CheckShapes(*alignment); !good.ok()) return good.error();
-    const UniformTrial& first = alignment->trials.front().warped;
+    const UniformTrial& first = alignment->trials.front().own;
     if (tool != nullptr && !first.joint_names.empty()) {
       for (const std::string& name : tool->joint_names()) {
         if (std::find(first.joint_names.begin(), first.joint_names.end(), name) ==

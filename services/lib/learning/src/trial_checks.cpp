@@ -33,7 +33,7 @@ void OrderJoints(UniformTrial& trial, const std::vector<std::string>& names) {
 }
 
 void KeepObjects(UniformTrial& trial, const std::vector<std::string>& names) {
-  std::vector<std::vector<geometry::Pose>> paths;
+  std::vector<PosePath> paths;
   std::vector<bool> has_orientation;
   for (const std::string& name : names) {
     const auto at = static_cast<std::size_t>(

@@ -23,7 +23,8 @@ Eigen::MatrixXd Resample(const Eigen::Ref<const Eigen::MatrixXd>& own, const Pla
   return out;
 }
 
-std::vector<geometry::Pose> Resample(const std::vector<geometry::Pose>& own, const Places& places) {
+template <typename Poses>
+std::vector<geometry::Pose> ResamplePoses(const Poses& own, const Places& places) {
   std::vector<geometry::Pose> out;
   out.reserve(places.size());
   for (const signal::Place& place : places) {
@@ -39,16 +40,6 @@ std::vector<double> Resample(const std::vector<double>& own, const Places& place
     out.push_back((1 - place.part) * own[place.index] + place.part * own[place.index + 1]);
   }
   return out;
-}
-
-bool IsConstant(const std::vector<geometry::Pose>& poses) {
-  for (const geometry::Pose& pose : poses) {
-    if (pose.translation != poses.front().translation ||
-        pose.rotation.coeffs() != poses.front().rotation.coeffs()) {
-      return false;
-    }
-  }
-  return true;
 }
 
 }  // namespace
@@ -69,21 +60,25 @@ UniformTrial WarpTrial(const UniformTrial& trial, std::span<const double> own_kn
   warped.joint_names = trial.joint_names;
   warped.joints = Resample(trial.joints, places);
   warped.has_orientation = trial.has_orientation;
-  if (!trial.base_T_tool.empty()) warped.base_T_tool = Resample(trial.base_T_tool, places);
+  if (!trial.base_T_tool.empty()) warped.base_T_tool = ResamplePoses(trial.base_T_tool, places);
   if (!trial.hand_open.empty()) warped.hand_open = Resample(trial.hand_open, places);
   if (trial.touch_n.size() > 0) warped.touch_n = Resample(trial.touch_n, places);
   warped.object_names = trial.object_names;
   warped.object_has_orientation = trial.object_has_orientation;
-  for (const std::vector<geometry::Pose>& base_T_object : trial.base_T_object) {
+  for (const PosePath& base_T_object : trial.base_T_object) {
     // A static object stays static to the last bit.
-    warped.base_T_object.push_back(
-        IsConstant(base_T_object)
-            ? std::vector<geometry::Pose>(common_s.size(), base_T_object.front())
-            : Resample(base_T_object, places));
+    warped.base_T_object.push_back(base_T_object.still()
+                                       ? PosePath(common_s.size(), base_T_object.front())
+                                       : PosePath(ResamplePoses(base_T_object, places)));
   }
   warped.cutoff_hz = trial.cutoff_hz;
   warped.notes = trial.notes;
   return warped;
+}
+
+UniformTrial Warped(const Alignment& alignment, std::size_t trial) {
+  const AlignedTrial& aligned = alignment.trials[trial];
+  return WarpTrial(aligned.own, aligned.own_knots_s, alignment.knots_s, alignment.time_s);
 }
 
 }  // namespace exemplar::learning

@@ -14,6 +14,7 @@
 #include "exemplar/demonstration/tool_kinematics.hpp"
 #include "exemplar/demonstration/trial.hpp"
 #include "exemplar/learning/options.hpp"
+#include "exemplar/learning/pose_path.hpp"
 
 namespace exemplar::learning {
 
@@ -29,7 +30,7 @@ struct UniformTrial {
   std::vector<double> hand_open;  ///< n, or empty
   Eigen::VectorXd touch_n;        ///< n, summed over sensors; empty without touch
   std::vector<std::string> object_names;
-  std::vector<std::vector<geometry::Pose>> base_T_object;  ///< [object][frame]
+  std::vector<PosePath> base_T_object;  ///< [object][frame]
   std::vector<bool> object_has_orientation;
   double cutoff_hz = 0;            ///< low-pass of the motion; 0: none was needed
   std::vector<std::string> notes;  ///< cut-off chosen, repairs
@@ -70,7 +71,6 @@ struct AlignedTrial {
   std::vector<int> chosen;  ///< indices of the chosen beginnings within segmentation.markers
   /// First sample, chosen markers, last sample; of alignment=elastic, as many as its grid has.
   std::vector<double> own_knots_s;
-  UniformTrial warped;  ///< all streams on the common time base
 };
 
 struct Alignment {
@@ -89,6 +89,10 @@ struct Alignment {
   double choice_bound = 0;
   std::vector<std::string> warnings;  ///< names of trials that drag N_min down, have no marker, ...
 };
+
+/// All streams of a trial on the common time base, by the trial's own warp. Made at each call: what
+/// can be made again is not kept.
+UniformTrial Warped(const Alignment& alignment, std::size_t trial);
 
 using Progress = std::function<void(double fraction, std::string_view step)>;
 

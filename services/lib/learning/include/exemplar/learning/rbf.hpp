@@ -46,6 +46,11 @@ class CardinalRbf {
   /// form (Rippa 1999; for repeated positions against the mean of the others there).
   Eigen::MatrixXd LeaveOneOut(const Eigen::Ref<const Eigen::MatrixXd>& values) const;
 
+  /// The weights of the other trials in what they predict at `trial`'s place: 0 for itself.
+  Eigen::VectorXd LeftOutWeights(int trial) const;
+  /// The variance of that prediction, as Variance(); of a repeated position, their mean. Positive.
+  double LeftOutVariance(int trial) const;
+
   /// Variance of the prediction at `position` for a field of variogram |h| (m): 0 at the trials
   /// when ridge is 0.
   double Variance(const Eigen::Ref<const Eigen::VectorXd>& position) const;
