@@ -30,6 +30,20 @@ int main(int argc, char** argv) {
   options.Add("--step-ms", step_ms, "of the simulation").MinMax(0.1, 5);
   options.Add("--picture-encoding", settings.picture_encoding, "how pictures are sent")
       .OneOf({"jpeg", "png"});
+  options.Add("--pace", settings.pace, "simulated seconds a second; 0: as many as can be")
+      .MinMax(0, 1000);
+  options.Add("--in-step-with", settings.in_step_with,
+              "programs that run with --clock network: the simulated time waits for them");
+  double command_delay_ms = 0;
+  options.Add("--command-delay-ms", command_delay_ms, "until the servos hear of a command")
+      .MinMax(0, 1000);
+  options.Add("--noise-position", settings.noise.position_rad, "of measured joints, rad or m")
+      .MinMax(0, 1);
+  options.Add("--noise-velocity", settings.noise.velocity_rad_s, "likewise, rad/s or m/s")
+      .MinMax(0, 10);
+  options.Add("--noise-touch", settings.noise.touch_n, "of the measured touch, N").MinMax(0, 100);
+  int seed = 1;
+  options.Add("--seed", seed, "of the sensors' noise").MinMax(0, 1e9);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
 
   program::Signals signals;
@@ -38,6 +52,8 @@ int main(int argc, char** argv) {
   settings.leader = follow == "suit" ? simulator::Leader::kSuit : simulator::Leader::kCommand;
   settings.cameras = cameras == "on";
   settings.world.step = FromSeconds(1e-3 * step_ms);
+  settings.command_delay = FromSeconds(1e-3 * command_delay_ms);
+  settings.noise.seed = static_cast<std::uint64_t>(seed);
 
   const auto robot = kinematics::ReadRobotDescription(robot_folder);
   if (!robot) return program::Fail(kName, robot.error());

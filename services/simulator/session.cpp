@@ -1,6 +1,7 @@
 #include "simulator/session.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <deque>
 #include <map>
@@ -8,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "exemplar/base/rng.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/ircp/control.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 #include "simulator/cameras.hpp"
 #include "simulator/outbox.hpp"
 
@@ -120,7 +123,8 @@ class RunningSession final : public Session {
         joint_names_(robot.chain.joint_names()),
         home_(robot.home),
         world_(std::move(world)),
-        follower_(robot.chain.limits(), robot.home, options.follower) {
+        follower_(robot.chain.limits(), robot.home, options.follower),
+        noise_(options.noise.seed) {
     for (const ButtonState& button : world_.buttons()) clicks_.push_back(button.clicks);
   }
 
@@ -169,6 +173,12 @@ class RunningSession final : public Session {
                   });
     if (!reader) return reader.error();
     leader_reader_ = std::move(reader).value();
+    if (options_.pace == 1 && options_.in_step_with.empty()) return {};
+    auto time =
+        ircp::TimeLeader::Create(bus, clock_, kProgram, {.in_step_with = options_.in_step_with});
+    if (!time) return time.error();
+    time_ = std::move(time).value();
+    is_leading_.store(true);
     return {};
   }
 
@@ -176,7 +186,20 @@ class RunningSession final : public Session {
     log_.Info("running", {{"joints", joint_names_.size()},
                           {"rate_hz", options_.rate_hz},
                           {"follows", options_.leader == Leader::kSuit ? "suit" : "command"},
-                          {"cameras", cameras_ ? "on" : "off"}});
+                          {"cameras", cameras_ ? "on" : "off"},
+                          {"in_step_with", Join(options_.in_step_with, " ")}});
+    if (time_) {
+      RunInStep(stop);
+    } else {
+      RunInPace(stop);
+    }
+    states_->Finish();
+    control_->SetState("stopped", "asked to stop");
+    log_.Info("stopped", {{"sim_time_s", ToSeconds(world_.time())}});
+  }
+
+ private:
+  void RunInPace(const std::stop_token& stop) {
     Duration begin = clock_.Steady() - world_.time();
     Stamp epoch = clock_.Now() - world_.time();
     while (!stop.stop_requested()) {
@@ -194,11 +217,31 @@ class RunningSession final : public Session {
       while (world_.time() + world_.step() <= clock_.Steady() - begin) Tick(epoch);
       if (!clock_.SleepUntil(begin + world_.time() + world_.step(), stop)) break;
     }
-    states_->Finish();
-    control_->SetState("stopped", "asked to stop");
-    log_.Info("stopped", {{"sim_time_s", ToSeconds(world_.time())}});
   }
 
+  /// A beat is the period of the robot's state: others see no time between.
+  void RunInStep(const std::stop_token& stop) {
+    const Stamp epoch = clock_.Now() - world_.time();
+    const Duration begin = clock_.Steady();
+    const auto taken = [this](const std::string& program) {
+      const std::lock_guard lock(inbox_mutex_);
+      const auto it = last_seq_.find(program);
+      return it == last_seq_.end() ? 0 : it->second;
+    };
+    for (double beats = 1; time_->Lead(world_.time(), epoch + world_.time(), taken, stop);
+         ++beats) {
+      for (const std::string& program : time_->TakeLost()) {
+        log_.Warning("time goes on without a program that is silent", {{"program", program}});
+      }
+      const Duration until = FromSeconds(beats / options_.rate_hz) - world_.step() / 2;
+      while (world_.time() < until) Tick(epoch);
+      if (options_.pace == 0) continue;
+      const Duration real = FromSeconds(ToSeconds(world_.time()) / options_.pace);
+      if (!clock_.SleepUntil(begin + real, stop)) return;
+    }
+  }
+
+ public:
   // ---- how it goes
 
   Figures figures() const override {
@@ -217,7 +260,10 @@ class RunningSession final : public Session {
     now.faults = static_cast<std::uint64_t>(world_.faults());
     now.states_dropped = states_->dropped();
     now.pictures_skipped = cameras_ ? cameras_->skipped() : 0;
-    for (const ButtonState& button : world_.buttons()) now.clicks[button.name] = button.clicks;
+    for (const ButtonState& button : world_.buttons()) {
+      now.clicks[button.name] = button.clicks;
+      if (button.clicks > 0) now.last_click_s[button.name] = ToSeconds(button.last_click);
+    }
     return now;
   }
 
@@ -258,7 +304,12 @@ class RunningSession final : public Session {
       const std::lock_guard lock(inbox_mutex_);
       arrivals.swap(inbox_);
     }
-    for (const Arrival& arrival : arrivals) {
+    for (Arrival& arrival : arrivals) {
+      on_the_way_.emplace_back(world_.time() + options_.command_delay, std::move(arrival));
+    }
+    for (; !on_the_way_.empty() && on_the_way_.front().first <= world_.time();
+         on_the_way_.pop_front()) {
+      const Arrival& arrival = on_the_way_.front().second;
       std::optional<Setpoint> setpoint = MapOntoJoints(arrival);
       if (!setpoint) {
         ++refused_;
@@ -320,7 +371,8 @@ class RunningSession final : public Session {
     }
   }
 
-  ircp::JointStateSample State(Stamp stamp) const {
+  /// With the sensors' noise.
+  ircp::JointStateSample State(Stamp stamp) {
     ircp::JointStateSample sample;
     sample.header.stamp = stamp;
     sample.names = joint_names_;
@@ -328,11 +380,13 @@ class RunningSession final : public Session {
       return std::vector<double>(v.data(), v.data() + v.size());
     };
     sample.positions = list(world_.positions());
+    for (double& q : sample.positions) q += noise_.Normal(0, options_.noise.position_rad);
     sample.velocities = list(world_.velocities());
+    for (double& v : sample.velocities) v += noise_.Normal(0, options_.noise.velocity_rad_s);
     sample.efforts = list(world_.efforts());
     sample.hand_open = hand_open_;
     sample.touch_sensors = {kTouchSensor};
-    sample.touch_n = {world_.touch_n()};
+    sample.touch_n = {world_.touch_n() + noise_.Normal(0, options_.noise.touch_n)};
     sample.command_seq = follower_.acted_seq();
     return sample;
   }
@@ -340,12 +394,16 @@ class RunningSession final : public Session {
   // ---- what the network's threads call
 
   void Receive(Arrival arrival) {
-    const std::lock_guard lock(inbox_mutex_);
-    if (inbox_.size() >= kSamplesWaiting) {
-      inbox_.pop_front();  // The newest matters.
-      ++overrun_;
+    {
+      const std::lock_guard lock(inbox_mutex_);
+      if (inbox_.size() >= kSamplesWaiting) {
+        inbox_.pop_front();  // The newest matters.
+        ++overrun_;
+      }
+      last_seq_[arrival.header.source] = arrival.header.seq;
+      inbox_.push_back(std::move(arrival));
     }
-    inbox_.push_back(std::move(arrival));
+    if (is_leading_.load()) time_->Recheck();
   }
 
   ircp::Answer Obey(const ircp::CommandSample& command) {
@@ -410,7 +468,9 @@ class RunningSession final : public Session {
   mutable std::mutex mutex_;  ///< guards the world and what moves with it
   World world_;
   Follower follower_;
-  std::vector<std::uint64_t> clicks_;  ///< said so far, by button
+  Rng noise_;
+  std::deque<std::pair<Duration, Arrival>> on_the_way_;  ///< by when the servos hear of it
+  std::vector<std::uint64_t> clicks_;                    ///< said so far, by button
   double hand_open_ = 1;
   std::int64_t states_due_ = 0;
   std::uint64_t refused_ = 0;
@@ -418,12 +478,15 @@ class RunningSession final : public Session {
 
   mutable std::mutex inbox_mutex_;
   std::deque<Arrival> inbox_;
+  std::map<std::string, std::uint64_t> last_seq_;  ///< by who sent it
   std::uint64_t overrun_ = 0;
 
   std::unique_ptr<Cameras> cameras_;
   std::unique_ptr<ircp::Writer<ircp::JointStateSample>> state_writer_;
   std::unique_ptr<Outbox<Outgoing>> states_;
   Follower::Mode said_mode_ = Follower::Mode::kHolding;  ///< of the outbox's thread
+  std::unique_ptr<ircp::TimeLeader> time_;  ///< null: the world keeps pace with the clock
+  std::atomic<bool> is_leading_{false};     ///< time_ stands
   // Last: their threads call into what stands above.
   std::unique_ptr<ircp::ControlServer> control_;
   std::unique_ptr<ircp::Reader> leader_reader_;
@@ -439,6 +502,23 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
     return InvalidArgument(
         "rate is " + FormatDouble(options.rate_hz) + " Hz, must be above 0 and at most one a step",
         "rate-hz");
+  }
+  if (!(options.pace >= 0) || !std::isfinite(options.pace)) {
+    return InvalidArgument("pace is " + FormatDouble(options.pace) + ", must be 0 or more", "pace");
+  }
+  if (options.command_delay < Duration(0)) {
+    return InvalidArgument("command delay is " + FormatDouble(ToSeconds(options.command_delay)) +
+                               " s, must not be negative",
+                           "command-delay-ms");
+  }
+  const std::pair<const char*, double> noises[] = {{"noise-position", options.noise.position_rad},
+                                                   {"noise-velocity", options.noise.velocity_rad_s},
+                                                   {"noise-touch", options.noise.touch_n}};
+  for (const auto& noise : noises) {
+    if (noise.second >= 0 && std::isfinite(noise.second)) continue;
+    return InvalidArgument(std::string(noise.first) + " is " + FormatDouble(noise.second) +
+                               ", must be a standard deviation of 0 or more",
+                           noise.first);
   }
   Result<World> world = World::Create(robot, scene, options.world);
   if (!world) return world.error();

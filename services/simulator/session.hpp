@@ -23,6 +23,14 @@ namespace exemplar::simulator {
 /// Whom the robot follows.
 enum class Leader { kCommand, kSuit };
 
+/// Standard deviations of what is added to each measured value. The same seed gives the same noise.
+struct SensorNoise {
+  double position_rad = 0;    ///< or m
+  double velocity_rad_s = 0;  ///< or m/s
+  double touch_n = 0;
+  std::uint64_t seed = 1;
+};
+
 struct SessionOptions {
   Leader leader = Leader::kCommand;
   double rate_hz = 125;  ///< of ircp/joint_state
@@ -32,6 +40,14 @@ struct SessionOptions {
   int picture_quality = 95;
   WorldOptions world = {};
   FollowerOptions follower = {};
+  /// Simulated seconds a second; 0: as fast as everybody in step can. Other than 1, or with anybody
+  /// in step: the simulated time goes out on ircp/clock (ircp/simulated_time.hpp).
+  double pace = 1;
+  /// Programs that follow the simulated time: it waits for them.
+  std::vector<std::string> in_step_with = {};
+  /// From a command's arrival until the servos hear of it.
+  Duration command_delay{0};
+  SensorNoise noise = {};
 };
 
 /// Name of the touch sensor on ircp/joint_state: the sum over the robot's touch links.
@@ -43,6 +59,7 @@ struct Figures {
   std::string mode;   ///< "holding", "following", "going home"
   double touch_n = 0;
   std::map<std::string, std::uint64_t> clicks;  ///< by button
+  std::map<std::string, double> last_click_s;   ///< simulated; of those that clicked
   std::uint64_t refused = 0;                    ///< samples without sense for this robot
   std::uint64_t overrun = 0;                    ///< samples dropped: they came too fast
   std::uint64_t stale = 0;                      ///< times that samples stopped coming
@@ -66,7 +83,7 @@ class Session {
                                                  const scene::Description& scene,
                                                  const SessionOptions& options = {});
   virtual ~Session() = default;
-  /// Steps the world in pace with the clock until `stop`. Call once.
+  /// Steps the world until `stop`, in pace with the clock or in step with others. Call once.
   virtual void Run(std::stop_token stop) = 0;
 
   // For metrics; thread-safe.

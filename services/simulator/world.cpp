@@ -83,6 +83,15 @@ struct ButtonParts {
   Duration last_click{0};
 };
 
+/// A button on a rail.
+struct Cart {
+  int body = 0;
+  int mocap = 0;
+  scene::Rail rail;
+  Eigen::Vector3d base_p_start;
+  Duration begin{0};
+};
+
 Drive MakeDrive(const mjModel& model, const kinematics::Joint& joint) {
   const std::string name = RobotJoint(joint.name);
   const int id = mj_name2id(&model, mjOBJ_JOINT, name.c_str());
@@ -107,6 +116,7 @@ struct World::Impl {
   std::vector<bool> is_touch;  ///< by body
   std::vector<std::string> link_names;
   std::vector<ButtonParts> buttons;
+  std::vector<Cart> carts;
   std::int64_t steps = 0;
 
   Duration Now() const { return steps * options.step; }
@@ -170,6 +180,7 @@ struct World::Impl {
       chain.push_back(MakeDrive(*model, robot.model.joints[static_cast<std::size_t>(j)]));
     }
     buttons.clear();
+    carts.clear();
     for (const scene::Button& button : scene.buttons) {
       ButtonParts parts;
       parts.name = button.name;
@@ -177,6 +188,12 @@ struct World::Impl {
       parts.body = BodyId(*model, ThingBody(button.name));
       const int joint = mj_name2id(model.get(), mjOBJ_JOINT, CapJoint(button.name).c_str());
       parts.qpos = model->jnt_qposadr[joint];
+      if (button.rail) {
+        carts.push_back({.body = parts.body,
+                         .mocap = model->body_mocapid[parts.body],
+                         .rail = *button.rail,
+                         .base_p_start = button.base_T_object.translation});
+      }
       buttons.push_back(std::move(parts));
     }
     mj_forward(model.get(), data.get());
@@ -191,6 +208,15 @@ struct World::Impl {
       mjtNum* range = Row(model->actuator_forcerange, 2, drive.actuator);
       range[0] = -drive.effort - bias;
       range[1] = drive.effort - bias;
+    }
+  }
+
+  void MoveCarts() {
+    for (const Cart& cart : carts) {
+      const Eigen::Vector3d base_p_cart =
+          cart.base_p_start +
+          cart.rail.WayAt(ToSeconds(Now() - cart.begin)) * cart.rail.base_direction;
+      std::copy_n(base_p_cart.data(), 3, Row(data->mocap_pos, 3, cart.mocap));
     }
   }
 
@@ -259,6 +285,7 @@ void World::SetTarget(const Eigen::Ref<const Eigen::VectorXd>& positions,
 }
 
 void World::Step() {
+  impl_->MoveCarts();
   mj_step1(impl_->model.get(), impl_->data.get());
   impl_->CompensateBias();
   mj_step2(impl_->model.get(), impl_->data.get());
@@ -380,6 +407,11 @@ Status World::Place(std::string_view thing, const geometry::Pose& base_T_thing) 
     return FailedPrecondition("\"" + std::string(thing) + "\" would stand in the robot, " +
                                   std::to_string(std::lround(1000 * overlap)) + " mm deep",
                               "object");
+  }
+  for (Cart& cart : w.carts) {
+    if (cart.body != body) continue;
+    cart.base_p_start = p;
+    cart.begin = w.Now();
   }
   return {};
 }

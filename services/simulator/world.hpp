@@ -74,7 +74,8 @@ class World {
 
   std::vector<ButtonState> buttons() const;
   void ResetClicks();
-  /// Moves an obstacle or a button. kNotFound; kFailedPrecondition: it would stand in the robot.
+  /// Moves an obstacle or a button; where it stands on a rail, that begins there. kNotFound;
+  /// kFailedPrecondition: it would stand in the robot.
   Status Place(std::string_view thing, const geometry::Pose& base_T_thing);
 
   /// base_T_thing of an obstacle or a button. kNotFound.

@@ -60,6 +60,11 @@ def turned(q, v):
     return times(times(q, (*v, 0.0)), (-q[0], -q[1], -q[2], q[3]))[:3]
 
 
+def widened(span, factor):
+    middle, half = (span[0] + span[1]) / 2, (span[1] - span[0]) / 2
+    return middle - factor * half, middle + factor * half
+
+
 class Place:
     """A button, where it stands: `tilt` leans it over towards `lean`, `turn` turns it about its own normal."""
 
@@ -159,7 +164,8 @@ class Robot:
                 write_trial(files[-1], Place(REGIONS[self.name], rng), self.home, rng)
             services.cli(self.learning, "trial", "submit", "--skill", SKILL, *files)
             services.cli(self.learning, "skill", "learn", SKILL)
-            return [self.press(number, Place(REGIONS[self.name], rng)) for number in range(self.options.presses)]
+            region = [widened(span, self.options.wide) for span in REGIONS[self.name][:2]] + [REGIONS[self.name][2]]
+            return [self.press(number, Place(region, rng)) for number in range(self.options.presses)]
         finally:
             services.stop()
 
@@ -170,8 +176,10 @@ class Robot:
         scene = folder / "scene.yaml"
         scene.write_text(scene_for(place), encoding="utf-8")
         try:
-            simulator = system.start("simulator", "--robot", self.model, "--scene", scene, "--cameras", "off", "--log-format", "json")
-            executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, server=True)
+            pace = [] if self.options.pace == 1 else ["--pace", self.options.pace, "--in-step-with", "executor"]
+            clock = [] if self.options.pace == 1 else ["--clock", "network"]
+            simulator = system.start("simulator", "--robot", self.model, "--scene", scene, "--cameras", "off", "--log-format", "json", *pace)
+            executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, *clock, server=True)
             address = executor.address()
             wait_until("the robot's joint state", lambda: system.cli(address, "robot", "status").get("joint_names"), 20)
             try:
@@ -220,6 +228,8 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
     parser.add_argument("--robots", default=",".join(REGIONS), help="some of them, separated by commas")
     parser.add_argument("--presses", type=int, default=100, help="a robot")
+    parser.add_argument("--wide", type=float, default=1, help="so many times as wide and deep as where the person pressed")
+    parser.add_argument("--pace", type=float, default=1, help="simulated seconds a second, in step; 1: by the machine's clock; 0: as many as can be")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--domain", type=int, default=93)
     parser.add_argument("--keep", type=pathlib.Path, help="where scenes and logs go (default: nowhere)")

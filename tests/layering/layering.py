@@ -44,7 +44,7 @@ LIBRARIES = {
     "rpc": ["base", "geometry", "demonstration", "learning", "api"],
 }
 
-PROGRAMS = ["capture_suit", "capture_tactile", "capture_vision", "recorder", "learning", "executor", "simulator"]
+PROGRAMS = ["capture_suit", "capture_tactile", "capture_vision", "recorder", "learning", "executor", "simulator", "reference_driver"]
 
 INCLUDE = re.compile(r"^\s*#\s*include\s*([<\"][^>\"]+[>\"])")
 

@@ -193,6 +193,28 @@ TEST_F(Pressing, NothingIsPlacedInTheRobot) {
   EXPECT_EQ(world_.touch_n(), 0);
 }
 
+TEST_F(Pressing, AButtonOnARailGoesToAndFroAndBeginsWhereItIsPlaced) {
+  scene::Description scene = Scene("press_table.yaml");
+  scene.buttons.front().rail =
+      scene::Rail{.base_direction = Eigen::Vector3d::UnitY(), .length_m = 0.03, .speed_m_s = 0.1};
+  World world = MakeWorld(robot_, scene);
+  const auto way = [&](const Eigen::Vector3d& from) {
+    return Eigen::Vector3d(world.ThingPose("target")->translation - from);
+  };
+  const auto run = [&](int steps) {
+    for (int i = 0; i < steps; ++i) world.Step();
+  };
+  const Eigen::Vector3d start = scene.buttons.front().base_T_object.translation;
+  run(201);
+  EXPECT_NEAR((way(start) - Eigen::Vector3d(0, 0.02, 0)).norm(), 0, 1e-9);
+  run(200);
+  EXPECT_NEAR((way(start) - Eigen::Vector3d(0, 0.02, 0)).norm(), 0, 1e-9);
+  const Eigen::Vector3d elsewhere = start + Eigen::Vector3d(0.02, -0.05, 0.01);
+  ASSERT_TRUE(world.Place("target", geometry::Pose::FromTranslation(elsewhere)).ok());
+  run(101);
+  EXPECT_NEAR((way(elsewhere) - Eigen::Vector3d(0, 0.01, 0)).norm(), 0, 1e-9);
+}
+
 TEST_F(Pressing, AnUnknownThingCannotBePlaced) {
   const Status placed = world_.Place("lamp", {});
   ASSERT_FALSE(placed.ok());

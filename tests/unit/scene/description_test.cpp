@@ -72,6 +72,34 @@ TEST(Description, FocalLengthMapsTheFieldOfViewOntoThePicturesHeight) {
   EXPECT_NEAR(camera.focal_px(), 240, 1e-9);
 }
 
+TEST(Description, ReadsTheRailOfACart) {
+  const std::string button = "buttons:\n  - name: a\n    position: [0, 0, 0]\n";
+  const Result<Description> read = ParseDescription(
+      button + "    rail: {direction: [0, 2, 0], length: 0.3, speed: 0.1}\n", "scene.yaml");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_TRUE(read->buttons[0].rail.has_value());
+  EXPECT_EQ(read->buttons[0].rail->base_direction, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(read->buttons[0].rail->length_m, 0.3);
+  EXPECT_EQ(read->buttons[0].rail->speed_m_s, 0.1);
+  EXPECT_THAT(ErrorOf(button + "    rail: {length: 0.3, speed: 0.25}\n"),
+              AllOf(HasSubstr("scene.yaml:4"), HasSubstr("speed"),
+                    HasSubstr("0.25 m/s is too fast, at most 0.2 are allowed")));
+  EXPECT_THAT(ErrorOf(button + "    rail: {length: 0, speed: 0.1}\n"),
+              AllOf(HasSubstr("length"), HasSubstr("must be positive")));
+  EXPECT_THAT(ErrorOf(button + "    rail: {length: 0.3, speed: -0.1}\n"),
+              AllOf(HasSubstr("speed"), HasSubstr("must not be negative")));
+  EXPECT_THAT(ErrorOf(button + "    rail: {lenght: 0.3, speed: 0.1}\n"), HasSubstr("lenght"));
+}
+
+TEST(Rail, GoesToItsEndAndBack) {
+  const Rail rail{.length_m = 0.3, .speed_m_s = 0.1};
+  EXPECT_EQ(rail.WayAt(0), 0);
+  EXPECT_NEAR(rail.WayAt(2), 0.2, 1e-12);
+  EXPECT_NEAR(rail.WayAt(4), 0.2, 1e-12);
+  EXPECT_NEAR(rail.WayAt(6.5), 0.05, 1e-12);
+  EXPECT_EQ((Rail{.length_m = 0.3, .speed_m_s = 0}).WayAt(100), 0);
+}
+
 TEST(Description, AnEmptyFileIsAnEmptyScene) {
   const Result<Description> read = ParseDescription("# nothing yet\n", "scene.yaml");
   ASSERT_TRUE(read.ok());

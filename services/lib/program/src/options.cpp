@@ -117,6 +117,11 @@ Options::Options(std::string program, std::string summary, std::string footer, R
     app.add_option("--best-effort", common.best_effort,
                    "topics not sent again when lost (ircp/joint_state); all programs alike");
   }
+  if (roles.clock) {
+    app.add_option("--clock", common.clock,
+                   "the machine's, or the simulated time that a simulator sends")
+        ->check(CLI::IsMember({"system", "network"}));
+  }
   if (roles.server) {
     app.add_option("--listen", common.listen, "HOST:PORT of the gRPC server; port 0 picks one");
     app.add_option("--port-file", common.port_file, "file that gets the port in use");

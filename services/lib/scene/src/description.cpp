@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "exemplar/base/text.hpp"
 #include "points_file.hpp"
 #include "yaml_reader.hpp"
 
@@ -74,6 +75,19 @@ Marker ReadMarker(const MapReader& map) {
   return marker;
 }
 
+Rail ReadRail(const MapReader& map) {
+  constexpr double kFastest_m_s = 0.2;
+  Rail rail;
+  rail.base_direction = map.Direction("direction", rail.base_direction);
+  rail.length_m = map.Number("length", std::nullopt, Range::kPositive);
+  rail.speed_m_s = map.Number("speed", std::nullopt, Range::kNotNegative);
+  if (rail.speed_m_s > kFastest_m_s) {
+    map.Complain("speed", FormatDouble(rail.speed_m_s) + " m/s is too fast, at most " +
+                              FormatDouble(kFastest_m_s) + " are allowed");
+  }
+  return rail;
+}
+
 Button ReadButton(Findings& findings, const MapReader& map) {
   Button button;
   button.name = map.Text("name");
@@ -90,6 +104,10 @@ Button ReadButton(Findings& findings, const MapReader& map) {
   if (map.Has("marker")) {
     button.marker = ReadMarker(MapReader(findings, map.Child("marker"), map.PathOf("marker"),
                                          {"id", "size", "position", "quaternion"}));
+  }
+  if (map.Has("rail")) {
+    button.rail = ReadRail(MapReader(findings, map.Child("rail"), map.PathOf("rail"),
+                                     {"direction", "length", "speed"}));
   }
   return button;
 }
@@ -183,7 +201,7 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
   top.List("buttons", [&](const YAML::Node& node, const std::string& path) {
     const MapReader map(findings, node, path,
                         {"name", "position", "quaternion", "contact", "normal", "radius", "height",
-                         "travel", "click_force", "marker"});
+                         "travel", "click_force", "marker", "rail"});
     Button button = ReadButton(findings, map);
     claim(things, map, button.name);
     description.buttons.push_back(std::move(button));
@@ -210,6 +228,11 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
 }  // namespace
 
 double StereoCamera::focal_px() const { return 0.5 * height / std::tan(0.5 * fovy_rad); }
+
+double Rail::WayAt(double time_s) const {
+  const double way = std::fmod(speed_m_s * time_s, 2 * length_m);
+  return way > length_m ? 2 * length_m - way : way;
+}
 
 Result<Description> ParseDescription(std::string_view yaml, std::string_view source) {
   return Parse(yaml, source, {});

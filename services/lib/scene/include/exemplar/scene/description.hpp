@@ -23,6 +23,9 @@
 //       travel: 0.004
 //       click_force: 3
 //       marker: {id: 7, size: 0.04, position: [0.05, 0, -0.02], quaternion: [0, 0, 0, 1]}
+//       rail: {direction: [0, 1, 0], length: 0.3, speed: 0.1}  # it stands on a cart, which goes
+//       from
+//                               # its position so far and back, for ever; at most 0.2 m/s
 //   cameras:
 //     - {name: stereo, position: [0.6, 0, 1.2], look_at: [0.6, 0, 0], up: [1, 0, 0], baseline: 0.1,
 //        width: 640, height: 480, fovy_deg: 50, rate_hz: 10}
@@ -68,6 +71,16 @@ struct Marker {
   geometry::Pose object_T_marker;
 };
 
+/// What a cart runs on, to and fro, from where it stands.
+struct Rail {
+  Eigen::Vector3d base_direction = Eigen::Vector3d::UnitX();  ///< unit
+  double length_m = 0;
+  double speed_m_s = 0;
+
+  /// From the start of the rail, `time_s` after the cart stood there.
+  double WayAt(double time_s) const;
+};
+
 struct Button {
   std::string name;
   geometry::Pose base_T_object;
@@ -78,6 +91,7 @@ struct Button {
   double travel_m = 0.004;
   double click_force_n = 3;
   std::optional<Marker> marker;
+  std::optional<Rail> rail = {};
 };
 
 /// A rectified stereo pair: the right camera is `baseline_m` along the left camera's +x.
