@@ -121,7 +121,6 @@ int main(int argc, char** argv) {
   auto app = executor::Executor::Create(**participant, clock, *log, *clients->skills, *robot,
                                         *scene, settings);
   if (!app.ok()) return program::Fail(kName, app.error());
-  station_clock.SetCommandsSent([&app] { return (*app)->CommandsSent(); });
   rpc::CallLog calls(*log);
   auto server = rpc::Server::Create(
       {.listen = options.common().listen,
@@ -137,6 +136,7 @@ int main(int argc, char** argv) {
   if (!metrics.ok()) return program::Fail(kName, metrics.error());
   log->Info("serving", {{"address", (*server)->address()}, {"robot", robot->name}});
 
+  station_clock.SetCommandsSent([&app] { return (*app)->CommandsSent(); });
   signals.Wait();
   (*app)->Shutdown();
   (*server)->Shutdown(std::chrono::seconds(1));
