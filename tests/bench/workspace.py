@@ -185,6 +185,8 @@ class Robot:
             try:
                 done = system.cli(address, "skill", "execute", SKILL, "--object", "target=" + place.words(), "--wait")
             except Failure as failure:
+                if "the motion ended as" in str(failure):
+                    return self.say(number, place, "stopped", str(failure).splitlines()[-1])
                 return self.say(number, place, *self.judged(scene, place, str(failure)))
             clicks = sum('"button clicked"' in line for line in simulator.log.read_text().splitlines())
             if clicks > 0 and done["state"] == "done":
