@@ -449,9 +449,9 @@ void Executor::EndMotion(MotionRun& run) {
   // Refused where a stop came first: then the motion ended by that.
   if (const std::optional<std::string> away = run.not_arrived(); away && IsMoving(state_.load())) {
     (void)Apply(Event::kFault, *away);
-  } else if (const std::optional<std::string> object = run.missed()) {
-    (void)Apply(Event::kMiss, "no touch: \"" + *object + "\" was not felt within " +
-                                  FormatFixed(1000 * options_.planner.guard.distance_m, 0) +
+  } else if (const GuardZone* zone = run.missed()) {
+    (void)Apply(Event::kMiss, "no touch: \"" + zone->object + "\" was not felt within " +
+                                  FormatFixed(1000 * zone->distance_m, 0) +
                                   " mm past the place where it was expected");
   } else {
     (void)Apply(Event::kFinish, "the end of the motion is reached");

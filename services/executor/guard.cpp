@@ -68,6 +68,17 @@ std::optional<Way> WayOf(const SkillMotion& motion, const Contact& contact) {
   return std::nullopt;
 }
 
+/// What a button of the scene asks for beside.
+GuardOptions OptionsFor(const std::string& object, const scene::Description& scene,
+                        GuardOptions options) {
+  for (const scene::Button& button : scene.buttons) {
+    if (button.name != object) continue;
+    options.touch_n = std::max(options.touch_n, 2 * button.click_force_n);
+    options.distance_m += button.travel_m;
+  }
+  return options;
+}
+
 /// Moves the press to the guard's depth and slows its way in down.
 void Guard(SkillMotion& motion, const Contact& contact, const Way& way,
            const GuardOptions& options) {
@@ -107,13 +118,14 @@ void Guard(SkillMotion& motion, const Contact& contact, const Way& way,
 
 }  // namespace
 
-std::optional<SkillMotion> WithGuard(const SkillMotion& motion, const GuardOptions& options) {
+std::optional<SkillMotion> WithGuard(const SkillMotion& motion, const scene::Description& scene,
+                                     const GuardOptions& options) {
   std::optional<SkillMotion> guarded;
   for (const Contact& contact : motion.contacts) {
     const std::optional<Way> way = WayOf(motion, contact);
     if (!way) continue;
     if (!guarded) guarded = motion;
-    Guard(*guarded, contact, *way, options);
+    Guard(*guarded, contact, *way, OptionsFor(contact.object, scene, options));
   }
   return guarded;
 }
@@ -136,11 +148,9 @@ std::vector<GuardZone> GuardZones(const motion::PlannedMotion& plan, const Skill
     const motion::ContactWindow& window = plan.contacts[i];
     GuardZone zone;
     zone.object = window.object;
-    zone.touch_n = options.touch_n;
-    for (const scene::Button& button : scene.buttons) {
-      if (button.name == zone.object)
-        zone.touch_n = std::max(zone.touch_n, 2 * button.click_force_n);
-    }
+    const GuardOptions own = OptionsFor(zone.object, scene, options);
+    zone.touch_n = own.touch_n;
+    zone.distance_m = own.distance_m;
     zone.begin_s = window.begin_s;
     double end_s = window.end_s;
     for (const motion::TouchWindow& touch : plan.touches) {

@@ -17,8 +17,10 @@ struct GuardOptions {
   /// A touch from here on ends a press; 0: presses end by position. A button of the scene that
   /// needs more than half of this to click raises it to twice what it needs.
   double touch_n = 0;
-  double distance_m = 0.008;  ///< past the place where contact is expected, along the approach
-  double speed_m_s = 0.015;   ///< of the tool, from `before_m` before that place on
+  /// Past the place where contact is expected, along the approach; the travel of a button of the
+  /// scene comes on top.
+  double distance_m = 0.010;
+  double speed_m_s = 0.015;  ///< of the tool, from `before_m` before that place on
   double before_m = 0.003;
 };
 
@@ -26,12 +28,14 @@ struct GuardOptions {
 /// press. A contact is a press where the tool comes, goes no deeper than a little past the contact
 /// and leaves the way it came; pushing along, or staying, is none.
 std::optional<demonstration::SkillMotion> WithGuard(const demonstration::SkillMotion& motion,
+                                                    const scene::Description& scene,
                                                     const GuardOptions& options);
 
 /// The press of a planned motion and where each place of its way in has its like on the way out.
 struct GuardZone {
   std::string object;
   double touch_n = 0;
+  double distance_m = 0;
   double begin_s = 0;                ///< from here on a touch counts
   double deepest_s = 0;              ///< here it must have come
   std::vector<double> leave_s = {};  ///< by kGuardStep_s from begin_s: where the motion goes on

@@ -100,10 +100,9 @@ Eigen::VectorXd MotionRun::commanded() const {
   return commanded_;
 }
 
-std::optional<std::string> MotionRun::missed() const {
+const GuardZone* MotionRun::missed() const {
   const int zone = missed_.load();
-  if (zone < 0) return std::nullopt;
-  return zones_[static_cast<std::size_t>(zone)].object;
+  return zone < 0 ? nullptr : &zones_[static_cast<std::size_t>(zone)];
 }
 
 std::optional<std::string> MotionRun::not_arrived() const {

@@ -48,8 +48,8 @@ class MotionRun {
   double duration_s() const { return plan_.trajectory.duration_s(); }
   Eigen::VectorXd commanded() const;
 
-  /// The object of the first press that met no touch, once it is past. Ends as such.
-  std::optional<std::string> missed() const;
+  /// The first press that met no touch, once it is past; else null.
+  const GuardZone* missed() const;
   /// Whether the robot was measured where the motion ends, or which joint was not.
   std::optional<std::string> not_arrived() const;
 

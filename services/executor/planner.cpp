@@ -127,7 +127,7 @@ Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
   Result<motion::PlannedMotion> planned = FailedPrecondition("not planned");
   std::optional<demonstration::SkillMotion> guarded;
   if (options_.guard.touch_n > 0 && measured.feels_touch) {
-    guarded = WithGuard(motion, options_.guard);
+    guarded = WithGuard(motion, scene_, options_.guard);
   }
   if (guarded) {
     planned =

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "allocation_count.hpp"
@@ -184,6 +185,59 @@ TEST_F(MotionRunTest, DoesNotAllocateInItsCycle) {
   for (int i = 0; i < 100; ++i) run_.Tick(kPeriod_s, State::kPaused, 1);
   for (int i = 0; i < 100; ++i) run_.AddLateness(std::chrono::microseconds(i));
   EXPECT_EQ(allocations.count(), 0);
+}
+
+TEST(GuardedRun, GoesOverToTheWayOutWithoutAStepOrAnAllocation) {
+  const kinematics::RobotDescription robot = Arm();
+  GuardZone zone{"target", 5, 0.01, 0.5, 2.0, {}};
+  for (double t = 0.5; t <= 2.0; t += kGuardStep_s) zone.leave_s.push_back(4 - t);
+  MotionRun run(robot, Swing(robot, 4), Checker(robot), {}, {zone});
+  double before = robot.home[0];
+  double speed_before = 0;
+  double deepest = 0;
+  double largest_change = 0;
+  int allocated = 0;
+  int cycles = 0;
+  for (; cycles < 1000 && !run.finished(); ++cycles) {
+    if (cycles == 140) {
+      deepest = before;
+      MeasuredState felt;
+      felt.joints = run.commanded();
+      felt.touch_n = 6;
+      run.Measure(felt);
+    }
+    const test::AllocationCount allocations;
+    const Setpoint& setpoint = run.Tick(kPeriod_s, State::kExecuting, 1);
+    allocated += allocations.count();
+    const double speed = (setpoint.positions[0] - before) / kPeriod_s;
+    largest_change = std::max(largest_change, std::abs(speed - speed_before));
+    before = setpoint.positions[0];
+    speed_before = speed;
+    if (deepest > 0) {
+      EXPECT_LT(before, deepest + 0.03);
+    }
+  }
+  EXPECT_TRUE(run.finished());
+  EXPECT_EQ(run.missed(), nullptr);
+  EXPECT_NEAR(before, robot.home[0], 1e-9);
+  // Unpressed it takes 4 s and the rest at the end.
+  EXPECT_LT(cycles * kPeriod_s, 3.2);
+  EXPECT_LT(largest_change, 0.12) << "rad/s from one cycle to the next";
+  if (test::AllocationCount::Works()) {
+    EXPECT_EQ(allocated, 0);
+  }
+}
+
+TEST(GuardedRun, KnowsThePressThatMetNoTouch) {
+  const kinematics::RobotDescription robot = Arm();
+  const GuardZone zone{"target", 5, 0.01, 0.5, 1.0, {3.0}};
+  MotionRun run(robot, Swing(robot, 2), Checker(robot), {}, {zone});
+  for (int cycle = 0; cycle < 1000 && !run.finished(); ++cycle) {
+    EXPECT_EQ(run.missed() != nullptr, run.path_time_s() >= 1.0);
+    run.Tick(kPeriod_s, State::kExecuting, 1);
+  }
+  ASSERT_NE(run.missed(), nullptr);
+  EXPECT_EQ(run.missed()->object, "target");
 }
 
 TEST(AllocationCount, SeesWhatEigenAndTheStandardLibraryAllocate) {
