@@ -148,6 +148,7 @@ buttons:
 class Robot:
     def __init__(self, options, name, folder):
         self.options, self.name, self.folder = options, name, folder
+        self.guard = ["--guard-touch-n", options.guard_touch_n]
         self.model = ROOT / "deploy" / "models" / name
         self.judge = [str(options.bin / "workspace_judge"), "--robot", str(self.model)]
         self.home = json.loads(subprocess.run(self.judge, check=True, capture_output=True, text=True).stdout)
@@ -179,7 +180,7 @@ class Robot:
             pace = [] if self.options.pace == 1 else ["--pace", self.options.pace, "--in-step-with", "executor"]
             clock = [] if self.options.pace == 1 else ["--clock", "network"]
             simulator = system.start("simulator", "--robot", self.model, "--scene", scene, "--cameras", "off", "--log-format", "json", *pace)
-            executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, *clock, server=True)
+            executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, *clock, *self.guard, server=True)
             address = executor.address()
             wait_until("the robot's joint state", lambda: system.cli(address, "robot", "status").get("joint_names"), 20)
             try:
@@ -231,6 +232,7 @@ def main():
     parser.add_argument("--robots", default=",".join(REGIONS), help="some of them, separated by commas")
     parser.add_argument("--presses", type=int, default=100, help="a robot")
     parser.add_argument("--wide", type=float, default=1, help="so many times as wide and deep as where the person pressed")
+    parser.add_argument("--guard-touch-n", type=float, default=0, help="as the executor's: presses end by touch; 0: by position alone")
     parser.add_argument("--pace", type=float, default=1, help="simulated seconds a second, in step; 1: by the machine's clock; 0: as many as can be")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--domain", type=int, default=93)
