@@ -319,5 +319,75 @@ class RunningTest(unittest.TestCase):
         return file.read_bytes()[-8:]
 
 
+class InMotionTest(unittest.TestCase):
+    """What ends while the simulated robot moves, by real processes."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-motion-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.programs = []
+        cls.addClassCleanup(cls.kill)
+        cls.station = ["--station", "motion", "--domain", "93"]
+        cls.scene = ["--robot", ROBOT, "--scene", RAIL]
+        cls.learning = cls.start("learning", "--data-dir", cls.folder / "learning")
+        cls.simulator = cls.start("simulator", *cls.scene, "--cameras", "off", *cls.station)
+        files = trials.write_set(cls.folder / "trials", [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06)])
+        for words in (["trial", "submit", "--skill", "press", *files], ["skill", "learn", "press"]):
+            done = cls.ask(cls.learning, *words)
+            assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def start(cls, name, *arguments):
+        program = Program(cls.folder, name, *arguments)
+        cls.programs.append(program)
+        return program
+
+    @classmethod
+    def kill(cls):
+        for program in cls.programs:
+            if program.process.poll() is None:
+                program.process.kill()
+            program.process.wait()
+
+    @staticmethod
+    def ask(program, *words):
+        command = [BINARIES / "exemplar", "--server", f"127.0.0.1:{program.port()}", *words]
+        return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=60, check=False)
+
+    def moving_executor(self):
+        """An executor in the middle of a motion."""
+        executor = self.start("executor", *self.scene, "--learning", f"127.0.0.1:{self.learning.port()}", *self.station)
+        seen = "exemplar_executor_joint_state_age_seconds"
+        self.assertTrue(wait_for(lambda: executor.metrics().get(seen, 9) < 0.2), executor.lines())
+        done = self.ask(executor, "skill", "execute", "press", "--object", "target=0.55,-0.15,0.05")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue(wait_for(lambda: executor.metrics()['exemplar_executor_state{state="executing"}'] == 1), executor.lines())
+        cycles = executor.metrics()["exemplar_executor_cycles_total"]
+        self.assertTrue(wait_for(lambda: executor.metrics()["exemplar_executor_cycles_total"] > cycles + 40))
+        return executor
+
+    def stale(self):
+        return self.simulator.metrics()["exemplar_simulator_stale_total"]
+
+    def test_sigterm_in_motion_holds_and_then_exits(self):
+        executor = self.moving_executor()
+        code, seconds = executor.end()
+        self.assertEqual(code, 0, executor.lines())
+        self.assertLess(seconds, 3)
+        lines = executor.lines()
+        stop = next(n for n, line in enumerate(lines) if "protective_stop" in line and "shutting down" in line)
+        self.assertLess(stop, next(n for n, line in enumerate(lines) if "stopped" in line and n > stop), lines)
+
+    def test_the_robot_holds_by_itself_when_its_executor_is_killed(self):
+        executor = self.moving_executor()
+        before = self.stale()
+        executor.end(signal.SIGKILL)
+        self.assertTrue(wait_for(lambda: self.stale() == before + 1, 5))
+        self.assertIsNone(self.simulator.process.poll())
+        # And another one takes it from where it stands.
+        self.assertEqual(self.moving_executor().end()[0], 0)
+
+
 if __name__ == "__main__":
     unittest.main()
