@@ -61,5 +61,43 @@ TEST(Streams, WithoutRowsOrColumnsSumToNothing) {
             Eigen::MatrixXd::Zero(5, 3));
 }
 
+TEST(Streams, SumToAMatrixOfTheSameNumbers) {
+  Rng rng(2);
+  const Eigen::MatrixXd columns = RandomMatrix(rng, 21, 4);
+  const Eigen::VectorXd weights = RandomMatrix(rng, 4, 1);
+  const Streams streams(columns);
+  EXPECT_EQ(streams.Sum(weights, 7, 3), streams.Sum(weights).reshaped(7, 3));
+}
+
+TEST(RoundedStreams, AreOffByNoMoreThanTheRoundingOfTheirDistancesFromTheMean) {
+  Rng rng(3);
+  for (const int rows : {1, 7, 8, 9, 16, 601}) {
+    for (const int count : {1, 2, 5, 10, 31}) {
+      // Far from zero beside what they differ by.
+      const Eigen::MatrixXd columns = RandomMatrix(rng, rows, count).array() + 100;
+      const Eigen::VectorXd weights = RandomMatrix(rng, count, 1);
+      const Eigen::MatrixXd sum = RoundedStreams(columns).Sum(weights, rows, 1);
+      const Eigen::VectorXd expected = columns * weights;
+      const double furthest = (columns.colwise() - columns.rowwise().mean()).cwiseAbs().maxCoeff();
+      const double bound = 0x1p-32 * furthest * weights.cwiseAbs().sum() + 1e-12 * count;
+      ASSERT_EQ(sum.rows(), rows);
+      EXPECT_LE((sum - expected).cwiseAbs().maxCoeff(), bound) << rows << " rows of " << count;
+    }
+  }
+}
+
+TEST(RoundedStreams, OfEqualColumnsAreExact) {
+  const Eigen::VectorXd column = Eigen::VectorXd::LinSpaced(12, -1, 2.5);
+  const RoundedStreams streams(column.replicate(1, 2));
+  EXPECT_EQ(streams.Sum(Eigen::Vector2d(0.75, 0.25), 4, 3), column.reshaped(4, 3));
+}
+
+TEST(RoundedStreams, WithoutRowsOrColumnsSumToNothing) {
+  EXPECT_EQ(RoundedStreams().Sum(Eigen::VectorXd(), 0, 0).size(), 0);
+  EXPECT_EQ(RoundedStreams(Eigen::MatrixXd(0, 4)).Sum(Eigen::Vector4d::Ones(), 6, 0).rows(), 6);
+  EXPECT_EQ(RoundedStreams(Eigen::MatrixXd(4, 0)).Sum(Eigen::VectorXd(), 2, 2),
+            Eigen::MatrixXd::Zero(2, 2));
+}
+
 }  // namespace
 }  // namespace exemplar::learning

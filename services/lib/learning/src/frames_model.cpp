@@ -92,7 +92,7 @@ FramesModel::FramesModel(Exemplars exemplars)
     exemplars.trials.DropJoints(static_cast<std::size_t>(j));
   }
   ReturnFreedMemory();
-  joints_ = Streams(joints);
+  joints_ = RoundedStreams(joints);
   hand_ = Streams(hand);
   joints.resize(0, 0);
   objectivity_ = Eigen::MatrixXd::Zero(frames_, exemplars.objects());
@@ -155,7 +155,7 @@ void FramesModel::MeetContacts(const Situation& situation, Prediction& predictio
 Prediction FramesModel::Predict(const Situation& situation) const {
   Prediction prediction;
   const Eigen::VectorXd weights = StyleWeights(situation);
-  prediction.joints = joints_.Sum(weights).reshaped(frames_, joints_count_);
+  prediction.joints = joints_.Sum(weights, frames_, joints_count_);
   if (hand_.rows() > 0) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
   prediction.objectivity = objectivity_;
   Eigen::VectorXd start_share = Eigen::VectorXd::Zero(frames_);

@@ -37,7 +37,7 @@ class FramesModel final : public Model {
   std::optional<PathFrames> path_;
   std::optional<RotationFrames> rotation_;
   std::optional<CardinalRbf> style_;  // of joints and hand, over the target's position
-  Streams joints_;                    // a trial's joint values (joint by joint) a column
+  RoundedStreams joints_;             // a trial's joint values (joint by joint) a column
   Streams hand_;
   Eigen::MatrixXd objectivity_;
 };

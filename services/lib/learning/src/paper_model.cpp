@@ -118,14 +118,14 @@ demonstration::ToolKinematics::Path PaperModel::Absolute(const Eigen::VectorXd& 
 std::vector<geometry::Pose> PaperModel::AbsolutePath(const Situation& situation) const {
   if (base_path_.rows() == 0) return {};
   const Eigen::VectorXd weights = Weights(situation);
-  const auto path = Absolute(weights, joints_.Sum(weights).reshaped(frames_, joints_count_));
+  const auto path = Absolute(weights, joints_.Sum(weights, frames_, joints_count_));
   return ToPoses(path.positions, path.rotations);
 }
 
 Prediction PaperModel::Predict(const Situation& situation) const {
   const Eigen::VectorXd weights = Weights(situation);
   Prediction prediction;
-  prediction.joints = joints_.Sum(weights).reshaped(frames_, joints_count_);
+  prediction.joints = joints_.Sum(weights, frames_, joints_count_);
   if (hand_.rows() > 0) prediction.hand = hand_.Sum(weights).cwiseMax(0.0).cwiseMin(1.0);
   prediction.objectivity = objectivity_;
   if (base_path_.rows() == 0) {
