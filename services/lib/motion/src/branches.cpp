@@ -11,7 +11,7 @@ namespace exemplar::motion {
 namespace {
 
 constexpr int kRandomSeeds = 8;
-constexpr int kMostLanes = 24;
+constexpr int kMostLanes = 14;
 constexpr double kSamePosture_rad = 0.25;
 /// Lanes are followed at about so many frames; those between are interpolated.
 constexpr int kSamples = 100;
