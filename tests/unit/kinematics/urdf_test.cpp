@@ -143,6 +143,42 @@ TEST(ParseUrdf, NamesFileLineAndElementOfWhatIsWrong) {
   EXPECT_THAT(ErrorOf(""), StartsWith("arm.urdf:"));
 }
 
+TEST(ParseUrdf, SaysFileLineAndElementOfEachBrokenPartOfAChain) {
+  const std::string good = testing::TwoLinkRobot();
+  struct Row {
+    const char* from;
+    const char* to;
+    const char* place;
+    const char* said;
+  };
+  const Row rows[] = {
+      {"<parent link=\"ground\"/>", "", "arm.urdf:6: joint \"first\"", "has no <parent"},
+      {"<child link=\"upper\"/>", "<child/>", "arm.urdf:6: joint \"first\"", "has no <child"},
+      {"<parent link=\"upper\"/>", "<parent link=\"uper\"/>", "arm.urdf:13: joint \"second\"",
+       "parent link \"uper\" does not exist; did you mean \"upper\"?"},
+      {"type=\"fixed\"", "type=\"welded\"", "arm.urdf:17: joint \"end\"",
+       "type \"welded\" is not supported"},
+      {"type=\"fixed\"", "", "arm.urdf:17: joint \"end\"", "has no type"},
+      {"name=\"second\"", "name=\"first\"", "arm.urdf:11: joint \"first\"", "two joints"},
+      {"<link name=\"tool\"/>", "<link name=\"ground\"/>", "arm.urdf:5: link \"ground\"",
+       "two links"},
+      {"<child link=\"lower\"/>", "<child link=\"upper\"/>", "arm.urdf:11: joint \"second\"", ""},
+      {"lower=\"-2.5\"", "lower=\"-2,5\"", "arm.urdf:15: joint \"second\"", "\"-2,5\""},
+      {"velocity=\"2\" effort=\"10\"", "velocity=\"fast\" effort=\"10\"",
+       "arm.urdf:9: joint \"first\"", "\"fast\""},
+      {"xyz=\"0.3 0 0\"", "xyz=\"0.3 0 1e999\"", "arm.urdf:18: joint \"end\"", "\"1e999\""},
+      {"xyz=\"0.3 0 0\"", "xyz=\"0.3 0 0 0\"", "arm.urdf:18: joint \"end\"", "must hold 3 numbers"},
+      {"effort=\"10\"/>\n  </joint>\n  <joint name=\"second\"",
+       "effort=\"10\"/><mimic joint=\"secnod\"/>\n  </joint>\n  <joint name=\"second\"",
+       "arm.urdf:9: joint \"first\"", "\"secnod\", which does not exist"},
+  };
+  for (const Row& row : rows) {
+    EXPECT_THAT(ErrorOf(Replaced(good, row.from, row.to)),
+                AllOf(StartsWith(row.place), HasSubstr(row.said)))
+        << row.to;
+  }
+}
+
 TEST(ParseUrdf, RefusesWrongShapesAndMasses) {
   const auto link = [](const std::string& inside) {
     return ErrorOf("<robot name='r'>\n<link name='a'>\n" + inside + "\n</link></robot>");
