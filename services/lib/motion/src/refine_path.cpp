@@ -27,7 +27,7 @@ constexpr double kPathSettled = 0.01;
 constexpr int kPathPatience = 5;
 constexpr int kMostRefusals = 4;
 /// Systems solved, at most, by the end of each stage: a path that cannot be followed costs no more.
-constexpr int kMostSystems[] = {8, 12, 15};
+constexpr int kMostSystems[] = {8, 12, 26};
 constexpr int kActiveSetRounds = 4;
 constexpr double kLimitMargin = 2e-3;  // rad or m
 
