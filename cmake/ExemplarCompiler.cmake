@@ -40,5 +40,5 @@ target_compile_options(exemplar_warnings INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # g++ 12 reports these inside Eigen, std::variant and std::string at -O2; none was ever true here.
   target_compile_options(exemplar_warnings INTERFACE -Wno-maybe-uninitialized -Wno-array-bounds
-    -Wno-stringop-overflow -Wno-restrict)
+    -Wno-stringop-overflow -Wno-stringop-overread -Wno-restrict)
 endif()
