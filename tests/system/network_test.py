@@ -144,13 +144,11 @@ class NetworkCase(unittest.TestCase):
     def record(self, during, rate="1", words=()):
         """Records one replay while `during` is done to the network; the file's end-effector messages."""
         _, server = self.start_recorder(*words)
-        capture = self.start_capture(self.trial, rate, *words)
-        self.at_recorder("record", "start", "--name", "t", "--topic", TOPIC, "--wait", "30", "--server", server)
+        # The capture starts and stops the recorder itself, so that the first sample is in the file.
+        capture = self.start_capture(self.trial, rate, "--record", "--name", "t", *words)
         during(server)
         self.assertEqual(capture.wait(60), 0, self.programs.logs())
-        wait_for(lambda: self.topic(server)["received"] + self.topic(server)["lost"] >= self.samples, "the last sample", 30)
         figures = self.topic(server)
-        self.at_recorder("record", "stop", "--server", server)
         info = exemplar("record", "info", self.folder / "data" / "t.mcap")
         return figures, {topic["topic"]: topic["messages"] for topic in info["topics"]}[TOPIC]
 
@@ -161,8 +159,7 @@ class NetworkCase(unittest.TestCase):
     def check_whole(self, figures, recorded):
         self.assertEqual(figures["received"], self.samples, self.programs.logs())
         self.assertEqual(figures["lost"], 0)
-        self.assertGreater(recorded, 0)
-        self.assertLessEqual(recorded, self.samples)
+        self.assertEqual(recorded, self.samples)
 
 
 class NetworkTest(NetworkCase):
@@ -175,7 +172,8 @@ class NetworkTest(NetworkCase):
         self.assertGreater(self.recorder_machine.dropped(), 20)
         counts = self.counts_of(readers[0])
         self.assertEqual(counts["last"], self.samples)
-        self.assertEqual(counts["missing"], 0, self.programs.logs())
+        # It joined in mid-stream: the writer repeats to it only what came after the two had matched.
+        self.assertLess(counts["missing"], 2, self.programs.logs())
 
     def test_a_cut_across_the_trials_end_loses_only_what_the_history_does_not_keep(self):
         rows = 2 * KEPT
