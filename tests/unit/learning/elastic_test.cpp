@@ -75,7 +75,9 @@ TEST(Elastic, PlaceAndSizeOfACurveChangeNothing) {
 }
 
 TEST(Elastic, AWarpOfAllCurvesChangesNoCorrespondence) {
-  const auto bent = [](double t) { return Curve(t) + Eigen::Vector2d(0.03 * t, 0.05 * t * t); };
+  const auto bent = [](double t) -> Eigen::Vector2d {
+    return Curve(t) + Eigen::Vector2d(0.03 * t, 0.05 * t * t);
+  };
   const auto plain = RegisterElastically(
       std::vector<Eigen::MatrixXd>{Sample(Curve), Sample([&](double t) { return bent(Late(t)); })});
   const auto warped = RegisterElastically(
