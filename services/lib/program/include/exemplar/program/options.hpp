@@ -16,7 +16,7 @@ struct CommonOptions {
   std::vector<std::string> peers;       ///< machines sought beside multicast
   std::vector<std::string> discovery_servers;  ///< HOST:PORT; with one, no multicast
   std::vector<std::string> best_effort;        ///< topics that are not sent again when lost
-  std::string clock = "system";  ///< or "network": the simulated time on ircp/clock
+  std::string clock = "system";                ///< or "network": the simulated time on ircp/clock
   std::string listen = "127.0.0.1:0";          ///< of the gRPC server; port 0 picks a free one
   std::string port_file;                       ///< gets the port that was picked
   std::string data_dir;
