@@ -18,6 +18,7 @@ OUTSIDE = {
     "SQLite": (r"<sqlite3", ["services/learning"]),
     "CLI11": (r"<CLI/", ["services/lib/program", "clients/cli"]),
     "spdlog": (r"<spdlog/", ["services/lib/program"]),
+    "Boost": (r"<boost/", ["services/lib/http"]),
 }
 
 # What each library may include of the others (beside itself): the direction of dependence.
@@ -39,6 +40,7 @@ LIBRARIES = {
     "replay": ["base", "ircp", "recording"],
     "api": ["base", "geometry", "demonstration", "learning"],
     "figures": ["base", "geometry", "learning"],
+    "http": ["base"],
     "program": ["base"],
     "bus": ["base", "geometry", "demonstration", "ircp", "recording"],
     "rpc": ["base", "geometry", "demonstration", "learning", "api"],
