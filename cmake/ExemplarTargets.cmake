@@ -45,12 +45,19 @@ function(exemplar_app name)
   exemplar_use_common_headers(${name}_app)
 endfunction()
 
-# exemplar_program(exemplar-NAME SOURCES main.cpp DEPS ...): a program in build/<preset>/bin.
+# exemplar_program(exemplar-NAME SOURCES main.cpp DEPS ...): a program in build/<preset>/bin. It is installed
+#   unless it belongs to the tests.
 function(exemplar_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_DEPS} exemplar_warnings)
   set_property(GLOBAL APPEND PROPERTY EXEMPLAR_PROGRAMS ${name})
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${CMAKE_SOURCE_DIR}" OUTPUT_VARIABLE folder)
+  if(folder MATCHES "^clients/")
+    install(TARGETS ${name} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT clients)
+  elseif(NOT folder MATCHES "^tests/")
+    install(TARGETS ${name} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT runtime-services)
+  endif()
 endfunction()
 
 # Every test includes GoogleTest, and most include Eigen: precompiled once they save a third of the tests'
