@@ -17,6 +17,7 @@ OUTSIDE = {
     "MuJoCo": (r"<mujoco/", ["services/simulator"]),
     "SQLite": (r"<sqlite3", ["services/learning"]),
     "CLI11": (r"<CLI/", ["services/lib/program", "clients/cli"]),
+    "OpenSSL": (r"<openssl/", ["services/lib/security"]),
     "spdlog": (r"<spdlog/", ["services/lib/program"]),
     "Boost": (r"<boost/", ["services/lib/http"]),
 }
@@ -41,9 +42,10 @@ LIBRARIES = {
     "api": ["base", "geometry", "demonstration", "learning"],
     "figures": ["base", "geometry", "learning"],
     "http": ["base"],
-    "program": ["base"],
-    "bus": ["base", "geometry", "demonstration", "ircp", "recording"],
-    "rpc": ["base", "geometry", "demonstration", "learning", "api"],
+    "security": ["base"],
+    "program": ["base", "security"],
+    "bus": ["base", "geometry", "demonstration", "ircp", "recording", "security"],
+    "rpc": ["base", "geometry", "demonstration", "learning", "api", "security"],
 }
 
 PROGRAMS = ["capture_suit", "capture_tactile", "capture_vision", "recorder", "learning", "executor", "simulator", "reference_driver"]

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <string_view>
 #include <utility>
 
 #include "exemplar/base/text.hpp"
@@ -81,6 +82,37 @@ class YamlConfig final : public CLI::Config {
   const CLI::App& app_;
 };
 
+void AddServerOptions(CLI::App& app, CommonOptions& common) {
+  security::ServerCredentials& server = common.server;
+  app.add_option("--listen", common.listen, "HOST:PORT of the gRPC server; port 0 picks one");
+  app.add_option("--port-file", common.port_file, "file that gets the port in use");
+  app.add_option("--tls-cert", server.certificate, "PEM file with this program's certificate")
+      ->envname("EXEMPLAR_TLS_CERT");
+  app.add_option("--tls-key", server.key, "PEM file with its key")->envname("EXEMPLAR_TLS_KEY");
+  app.add_option("--tls-client-ca", server.client_ca,
+                 "PEM file of the CA that callers' certificates must come from");
+  app.add_option("--access", server.access, "file that says who may call what (docs/security.md)");
+  app.add_flag("--insecure-listen", server.insecure_listen,
+               "listen beyond this machine though anybody may call, or in plain text");
+  app.add_option("--calls-per-s", server.calls_per_s,
+                 "what each caller may ask in the mean; 0: no limit")
+      ->check(CLI::Range(0.0, 1e6));
+}
+
+void AddClientOptions(CLI::App& app, security::ClientCredentials& client, bool own_certificate) {
+  app.add_option("--tls-ca", client.ca,
+                 "PEM file of the CA of the servers that are called; empty: plain text")
+      ->envname("EXEMPLAR_TLS_CA");
+  if (own_certificate) {
+    app.add_option("--tls-cert", client.certificate, "PEM file with this program's certificate")
+        ->envname("EXEMPLAR_TLS_CERT");
+    app.add_option("--tls-key", client.key, "PEM file with its key")->envname("EXEMPLAR_TLS_KEY");
+  }
+  app.add_option("--token", client.token, "sent to the servers that are called; @FILE reads a file")
+      ->envname("EXEMPLAR_TOKEN")
+      ->default_str("");
+}
+
 }  // namespace
 
 struct Options::Impl {
@@ -94,15 +126,18 @@ struct Options::Impl {
   }
 
   std::string program;
+  Roles roles;
   CommonOptions common;
   CLI::App app;
   CLI::Option* last = nullptr;
+  bool check = false;
 };
 
 Options::Options(std::string program, std::string summary, std::string footer, Roles roles)
     : impl_(std::make_unique<Impl>(program, std::move(summary), footer)) {
   CLI::App& app = impl_->app;
   CommonOptions& common = impl_->common;
+  impl_->roles = roles;
   app.config_formatter(std::make_shared<YamlConfig>(app));
   app.set_config("--config", "", "YAML file with any of these options; flags override it");
   app.allow_config_extras(CLI::config_extras_mode::error);
@@ -116,19 +151,21 @@ Options::Options(std::string program, std::string summary, std::string footer, R
                    "HOST:PORT of Fast DDS discovery servers, used instead of multicast");
     app.add_option("--best-effort", common.best_effort,
                    "topics not sent again when lost (ircp/joint_state); all programs alike");
+    app.add_option("--security", common.security,
+                   "folder that `exemplar security issue` made: authenticated, encrypted topics");
   }
   if (roles.clock) {
     app.add_option("--clock", common.clock,
                    "the machine's, or the simulated time that a simulator sends")
         ->check(CLI::IsMember({"system", "network"}));
   }
-  if (roles.server) {
-    app.add_option("--listen", common.listen, "HOST:PORT of the gRPC server; port 0 picks one");
-    app.add_option("--port-file", common.port_file, "file that gets the port in use");
-  }
+  if (roles.server) AddServerOptions(app, common);
+  if (roles.client) AddClientOptions(app, common.client, !roles.server);
   if (roles.data)
     app.add_option("--data-dir", common.data_dir, "folder for what is stored")->required();
   app.add_option("--metrics", common.metrics, "HOST:PORT of the Prometheus endpoint; empty: none");
+  app.add_flag("--check", impl_->check,
+               "run nothing: ask the program that runs with this --metrics for its health");
   app.add_option("--log-format", common.log_format, "how events are written to stderr")
       ->check(CLI::IsMember({"text", "json"}));
   app.add_option("--log-level", common.log_level, "least level that is written")
@@ -179,6 +216,10 @@ int Options::Refuse(const std::string& what) const {
 }
 
 std::optional<int> Options::Parse(int argc, char** argv) {
+  // A check needs none of what the program needs to run.
+  if (std::find(argv, argv + argc, std::string_view("--check")) != argv + argc) {
+    for (CLI::Option* option : impl_->app.get_options()) option->required(false);
+  }
   try {
     impl_->app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -198,6 +239,22 @@ std::optional<int> Options::Parse(int argc, char** argv) {
     const std::string name = word.substr(dashes, word.find('=') - dashes);
     return Refuse('"' + word + "\" is not expected" +
                   (dashes > 0 ? Suggestion(name, impl_->app, "--") : std::string()));
+  }
+  CommonOptions& common = impl_->common;
+  if (!common.security.empty() && !common.discovery_servers.empty()) {
+    return Refuse(
+        "--security and --discovery-server do not go together: Fast DDS 2.9 cannot secure a "
+        "discovery server; use multicast or --peer");
+  }
+  if (impl_->roles.server && impl_->roles.client && !common.client.ca.empty()) {
+    common.client.certificate = common.server.certificate;
+    common.client.key = common.server.key;
+  }
+  if (impl_->check) {
+    if (impl_->common.metrics.empty()) return Refuse("--check needs the program's --metrics");
+    const Status health = CheckHealth(impl_->common.metrics);
+    if (!health.ok()) return Fail(impl_->program, health.error());
+    return 0;
   }
   return std::nullopt;
 }

@@ -33,6 +33,10 @@ struct ParticipantOptions {
   /// Shared memory for neighbours on the same machine, at most this much of it (less where
   /// /dev/shm is small); 0: UDP only. Holds a few stereo pairs.
   std::size_t shared_memory_bytes = std::size_t{16} << 20;
+  /// Folder with cert.pem, key.pem and the rest that `exemplar security issue` makes: only
+  /// participants of the same station's CA are talked to, encrypted, each on the topics that its
+  /// permissions name. Empty: open. Not together with discovery_servers.
+  std::string security = {};
   /// Stamps samples; null: the machine's. Outlives the participant.
   const Clock* clock = nullptr;
   /// Hears of malformed samples and incompatible writers; null: nobody. Outlives the participant.

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "exemplar/security/credentials.hpp"
+
 namespace exemplar::program {
 
 /// What most programs share (DESIGN.md, "Processes").
@@ -16,9 +18,12 @@ struct CommonOptions {
   std::vector<std::string> peers;       ///< machines sought beside multicast
   std::vector<std::string> discovery_servers;  ///< HOST:PORT; with one, no multicast
   std::vector<std::string> best_effort;        ///< topics that are not sent again when lost
-  std::string clock = "system";                ///< or "network": the simulated time on ircp/clock
-  std::string listen = "127.0.0.1:0";          ///< of the gRPC server; port 0 picks a free one
-  std::string port_file;                       ///< gets the port that was picked
+  std::string security;  ///< folder with this program's DDS-Security files; empty: open network
+  std::string clock = "system";        ///< or "network": the simulated time on ircp/clock
+  std::string listen = "127.0.0.1:0";  ///< of the gRPC server; port 0 picks a free one
+  std::string port_file;               ///< gets the port that was picked
+  security::ServerCredentials server;  ///< of the gRPC server
+  security::ClientCredentials client;  ///< for the servers that this program calls
   std::string data_dir;
   std::string metrics;  ///< HOST:PORT of the Prometheus endpoint; empty: none
   std::string log_format = "text";
@@ -27,11 +32,15 @@ struct CommonOptions {
 
 /// Which of the common options a program has.
 struct Roles {
-  bool bus = false;     ///< --domain, --station, --interface, --peer, --discovery-server,
-                        ///< --best-effort
-  bool server = false;  ///< --listen, --port-file
-  bool data = false;    ///< --data-dir
-  bool clock = false;   ///< --clock
+  bool bus = false;  ///< --domain, --station, --interface, --peer, --discovery-server,
+                     ///< --best-effort, --security
+  bool server =
+      false;           ///< --listen, --port-file, --tls-cert, --tls-key, --tls-client-ca, --access,
+                       ///< --insecure-listen, --calls-per-s
+  bool data = false;   ///< --data-dir
+  bool clock = false;  ///< --clock
+  bool client = false;  ///< --tls-ca, --token; --tls-cert and --tls-key, which with `server` are
+                        ///< those of its server
 };
 
 /// Builds a command line on CLI11. `--config FILE.yaml` holds the same names without dashes

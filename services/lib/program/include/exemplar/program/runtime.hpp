@@ -1,6 +1,7 @@
 #pragma once
 // What surrounds a program's behaviour: logging, signals, metrics, the way out.
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <stop_token>
@@ -50,6 +51,12 @@ class MetricsServer {
 /// The server of --metrics; null where the option is empty. Destroy it before what `metrics` ask.
 Result<std::unique_ptr<MetricsServer>> ServeMetrics(const CommonOptions& options,
                                                     std::vector<Metric> metrics);
+
+/// Asks the program that serves its metrics on HOST:PORT for its health, as --check does; an
+/// address that means every interface is asked on loopback. Fails with kUnavailable where it is not
+/// well.
+Status CheckHealth(const std::string& address,
+                   std::chrono::milliseconds patience = std::chrono::seconds(2));
 
 /// Prints "PROGRAM: message" to stderr and returns the exit code for the error.
 int Fail(const std::string& program, const Error& error);

@@ -6,8 +6,10 @@
 #include <string>
 
 #include "exemplar/api/services.hpp"
+#include "exemplar/api/topics.hpp"
 #include "exemplar/base/result.hpp"
 #include "exemplar/base/stamp.hpp"
+#include "exemplar/security/credentials.hpp"
 
 namespace exemplar::rpc {
 
@@ -23,9 +25,11 @@ struct ClientOptions {
   Duration wait_for_server{0};
   /// Sent as `x-request-id` with a running number behind it; empty: one is made at random.
   std::string request_id = {};
+  /// With a CA, TLS; the server's certificate must name the host of `server`.
+  security::ClientCredentials credentials = {};
 };
 
-/// One connection to one server, shared by the four clients. Whether the server has a service shows
+/// One connection to one server, shared by all clients. Whether the server has a service shows
 /// when it is called: kUnavailable with the address where nobody answers, kFailedPrecondition where
 /// that server does not serve it. Errors carry the code, message and field that the server gave.
 struct Clients {
@@ -33,9 +37,11 @@ struct Clients {
   std::unique_ptr<api::SkillApi> skills;
   std::unique_ptr<api::ExecutorApi> executor;
   std::unique_ptr<api::RecorderApi> recorder;
+  std::unique_ptr<api::TopicApi> topics;  ///< of a gateway
 };
 
-/// Does not wait for the server. Errors: an address that is none.
+/// Does not wait for the server. Errors: an address that is none, credentials that cannot be read
+/// or would cross a network in plain text.
 Result<Clients> Connect(const ClientOptions& options);
 
 /// One skill, asked again and again as its objects move, over one stream: a question costs less

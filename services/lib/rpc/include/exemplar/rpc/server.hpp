@@ -9,8 +9,11 @@
 #include <string_view>
 
 #include "exemplar/api/services.hpp"
+#include "exemplar/api/topics.hpp"
+#include "exemplar/base/log.hpp"
 #include "exemplar/base/result.hpp"
 #include "exemplar/base/stamp.hpp"
+#include "exemplar/security/credentials.hpp"
 
 namespace exemplar::rpc {
 
@@ -20,6 +23,7 @@ struct Services {
   api::SkillApi* skills = nullptr;
   api::ExecutorApi* executor = nullptr;
   api::RecorderApi* recorder = nullptr;
+  api::TopicApi* topics = nullptr;
 };
 
 /// One finished call, for logs and metrics.
@@ -27,6 +31,11 @@ struct CallRecord {
   std::string_view method = {};      ///< "exemplar.v1.SkillService/Query"
   std::string_view request_id = {};  ///< the caller's `x-request-id`, else one made here
   std::string_view peer = {};        ///< "ipv4:127.0.0.1:40312"
+  std::string_view caller = {};      ///< the caller's name; empty where nobody has to have one
+  std::string_view target = {};      ///< what the call was about ("press"), where it is audited
+  /// "ok", the name of the ErrorCode, or "unauthenticated", "permission_denied", "rate_limited".
+  std::string_view outcome = {};
+  bool audited = false;  ///< moves the robot or deletes: who did it must be known later
   Status status = {};
   Duration duration{0};
 };
@@ -41,6 +50,13 @@ struct ServerOptions {
   std::size_t max_message_bytes = std::size_t{64} << 20;
   /// Larger files are refused while they are sent.
   std::size_t max_file_bytes = std::size_t{1} << 30;
+  /// Calls whose length does not depend on the work are cancelled after this; zero: never.
+  Duration max_call = std::chrono::minutes(2);
+  /// TLS, who may call, how often.
+  security::ServerCredentials credentials = {};
+  /// Hears when the access file or a certificate cannot be read again; null: nobody. Outlives the
+  /// server.
+  Log* log = nullptr;
   /// Called at the end of each call, from the call's thread: must be thread-safe and quick.
   std::function<void(const CallRecord&)> on_call = {};
 };
@@ -50,7 +66,9 @@ struct ServerOptions {
 /// the stop_token that the interface's method got. Thread-safe.
 class Server {
  public:
-  /// Listens when it returns. Errors name the address or the port file.
+  /// Listens when it returns. Errors name the address, the port file, or the option of the
+  /// credentials. An address beyond loopback is refused unless callers come with TLS and are known
+  /// by certificate or token, or the credentials say that it may be insecure.
   static Result<std::unique_ptr<Server>> Create(const ServerOptions& options, Services services);
   /// As Shutdown(1 s).
   virtual ~Server() = default;
