@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "exemplar/program/runtime.hpp"
+
 namespace exemplar::program {
 namespace {
 
@@ -55,6 +57,26 @@ TEST_F(OptionsTest, AnUnknownNameInTheFileIsRefused) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(Parse(options_, {"--config", WriteConfig("statoin: lab\n")}), 2);
   EXPECT_NE(testing::internal::GetCapturedStderr().find("statoin"), std::string::npos);
+}
+
+TEST_F(OptionsTest, ACheckAsksTheRunningProgramAndNeedsNoOtherOption) {
+  std::string robot;
+  options_.Add("--robot", robot, "folder").Required();
+  auto server = MetricsServer::Create("127.0.0.1:0", {});
+  ASSERT_TRUE(server.ok());
+  const std::string port = std::to_string((*server)->port());
+  EXPECT_EQ(Parse(options_, {"--check", "--metrics", "0.0.0.0:" + port}), 0);
+  server->reset();
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(Parse(options_, {"--check", "--metrics", "0.0.0.0:" + port}), 5);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("no healthy program answers on 0.0.0.0:"),
+            std::string::npos);
+}
+
+TEST_F(OptionsTest, ACheckSaysThatItNeedsTheMetrics) {
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(Parse(options_, {"--check"}), 2);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("--metrics"), std::string::npos);
 }
 
 TEST_F(OptionsTest, ASlipOfTheHandIsToldTheNearestName) {
