@@ -189,7 +189,7 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
   std::map<std::string, perception::ObjectFinder> finders;
   for (const scene::StereoCamera& camera : scene.cameras) {
     Result<perception::ObjectFinder> finder =
-        perception::ObjectFinder::Create(camera, scene.buttons, options.finder);
+        perception::ObjectFinder::Create(camera, scene::MarkedThings(scene), options.finder);
     if (!finder) return finder.error();
     finders.emplace(camera.name, std::move(finder).value());
   }

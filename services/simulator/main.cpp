@@ -27,6 +27,11 @@ int main(int argc, char** argv) {
   options.Add("--cameras", cameras, "whether the scene's cameras send pictures")
       .OneOf({"on", "off"});
   options.Add("--rate-hz", settings.rate_hz, "of ircp/joint_state").MinMax(1, 1000);
+  options
+      .Add(
+          "--track-hz", settings.track_hz,
+          "of ircp/objects, as a tracking system measures buttons and objects; 0: cameras see them")
+      .MinMax(0, 1000);
   options.Add("--step-ms", step_ms, "of the simulation").MinMax(0.1, 5);
   options.Add("--picture-encoding", settings.picture_encoding, "how pictures are sent")
       .OneOf({"jpeg", "png"});
@@ -42,6 +47,9 @@ int main(int argc, char** argv) {
   options.Add("--noise-velocity", settings.noise.velocity_rad_s, "likewise, rad/s or m/s")
       .MinMax(0, 10);
   options.Add("--noise-touch", settings.noise.touch_n, "of the measured touch, N").MinMax(0, 100);
+  options.Add("--noise-object", settings.noise.object_m, "of what --track-hz measures, m")
+      .MinMax(0, 1);
+  options.Add("--noise-object-turn", settings.noise.object_rad, "likewise, rad").MinMax(0, 1);
   int seed = 1;
   options.Add("--seed", seed, "of the sensors' noise").MinMax(0, 1e9);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;

@@ -39,6 +39,17 @@ Attributes LinkContact() {
 Attributes ThingContact() {
   return ContactAttributes() + Attributes{{"contype", 2.0}, {"conaffinity", 1.0}};
 }
+/// Movable objects touch links, things and each other; what they say of friction counts for both.
+/// They resist turning and rolling on the spot a little, as real ones do.
+Attributes ObjectContact(double friction) {
+  return {{"solref", {kContactTime, 1}},
+          {"solimp", {0.95, 0.99, 0.001}},
+          {"friction", {friction, 0.005, 0.0005}},
+          {"priority", 1.0},
+          {"condim", 6.0},
+          {"contype", 4.0},
+          {"conaffinity", 7.0}};
+}
 Attributes SeenOnly() { return {{"contype", 0.0}, {"conaffinity", 0.0}, {"mass", 0.0}}; }
 
 /// Meshes by file and scale, each written once.
@@ -115,9 +126,7 @@ class Writer {
                             {"balanceinertia", "true"},
                             {"boundmass", 1e-3},
                             {"boundinertia", 1e-6}});
-    xml_.Empty("option",
-               {{"timestep", options_.step_s}, {"integrator", "implicit"}, {"cone", "elliptic"}});
-    xml_.Empty("size", {{"njmax", 800.0}, {"nconmax", 200.0}});
+    WriteOptions();
     xml_.Empty("statistic", {{"extent", 1.0}, {"center", {0, 0, 0}}});
     WriteVisual();
     xml_.Open("asset");
@@ -129,6 +138,7 @@ class Writer {
     WriteRobot();
     for (const scene::Obstacle& obstacle : scene_.obstacles) WriteObstacle(obstacle);
     for (const scene::Button& button : scene_.buttons) WriteButton(button);
+    for (const scene::Object& object : scene_.objects) WriteObject(object);
     xml_.Close();
     WriteExclusions();
     WriteMimics();
@@ -163,7 +173,30 @@ class Writer {
       }
       collect(obstacle.shape);
     }
+    for (const scene::Object& object : scene_.objects) {
+      if (!MeshIsReadable(object.shape)) {
+        return InvalidArgument("object \"" + object.name +
+                               "\": the simulator reads STL and OBJ, not " +
+                               std::get<kinematics::Mesh>(object.shape).path);
+      }
+      collect(object.shape);
+    }
     return {};
+  }
+
+  void WriteOptions() {
+    const bool moves = std::any_of(scene_.objects.begin(), scene_.objects.end(),
+                                   [](const scene::Object& object) { return !object.fixed; });
+    Attributes option = {
+        {"timestep", options_.step_s}, {"integrator", "implicit"}, {"cone", "elliptic"}};
+    // Firmer friction, so that what is held does not creep out of the hand.
+    if (moves) option.push_back({"impratio", 10.0});
+    xml_.Open("option", option);
+    // A cylinder stands on more than one point of its rim.
+    if (moves) xml_.Empty("flag", {{"multiccd", "enable"}});
+    xml_.Close();
+    const double objects = static_cast<double>(scene_.objects.size());
+    xml_.Empty("size", {{"njmax", 800 + 200 * objects}, {"nconmax", 200 + 40 * objects}});
   }
 
   void WriteVisual() {
@@ -202,6 +235,8 @@ class Writer {
     material("paper", {0.95, 0.95, 0.95, 1}, 0.3);
     material("housing", {0.25, 0.27, 0.3, 1}, 0);
     material("cap", {0.8, 0.12, 0.1, 1}, 0.1);
+    material("block", {0.2, 0.42, 0.75, 1}, 0);
+    material("tray", {0.35, 0.55, 0.38, 1}, 0);
     material("obstacle", {0.62, 0.5, 0.37, 1}, 0);
   }
 
@@ -358,6 +393,7 @@ class Writer {
       const std::vector<int>& chain = robot_.chain.joint_indices();
       const auto it = std::find(chain.begin(), chain.end(), static_cast<int>(j));
       if (it != chain.end()) gains = robot_.servo[static_cast<std::size_t>(it - chain.begin())];
+      if (model_.hand && model_.hand->joint == static_cast<int>(j)) gains = robot_.hand_servo;
       xml_.Empty("general", {{"name", RobotJoint(joint.name)},
                              {"joint", RobotJoint(joint.name)},
                              {"gaintype", "fixed"},
@@ -423,6 +459,23 @@ class Writer {
                          {"solimplimit", {0.95, 0.99, 0.0005}}});
     xml_.Empty("geom", cylinder(protrusion, 0) + Attributes{{"material", "cap"}});
     xml_.Close();
+    xml_.Close();
+  }
+
+  void WriteObject(const scene::Object& object) {
+    const Attributes shape =
+        ShapeAttributes(object.shape, meshes_) + Attributes{{"group", kSeenGroup}};
+    if (object.fixed) {
+      OpenThing(object.name, object.base_T_object);
+      xml_.Empty("geom", shape + ThingContact() + Attributes{{"material", "tray"}});
+    } else {
+      xml_.Open("body", Attributes{{"name", ThingBody(object.name)}} +
+                            PoseAttributes(object.base_T_object));
+      xml_.Empty("freejoint", {{"name", ThingBody(object.name)}});
+      xml_.Empty("geom", shape + ObjectContact(object.friction) +
+                             Attributes{{"mass", object.mass_kg}, {"material", "block"}});
+    }
+    if (object.marker) WriteMarker(*object.marker);
     xml_.Close();
   }
 

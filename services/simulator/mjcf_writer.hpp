@@ -41,7 +41,7 @@ ButtonMechanism MechanismOf(const scene::Button& button);
 /// called "world" or like an obstacle does no harm.
 std::string LinkBody(const std::string& link);
 std::string RobotJoint(const std::string& joint);
-std::string ThingBody(const std::string& thing);  ///< an obstacle or a button's housing
+std::string ThingBody(const std::string& thing);  ///< an obstacle, an object, a button's housing
 std::string CapBody(const std::string& button);
 std::string CapJoint(const std::string& button);
 std::string EyeName(const std::string& camera, bool right);

@@ -23,6 +23,9 @@ constexpr const char* kProgram = "simulator";
 /// Behind by more than this, the world lets time pass rather than rush after it.
 constexpr Duration kLargestLag = std::chrono::milliseconds(200);
 constexpr std::size_t kStatesWaiting = 256;
+/// The source of tracked objects.
+constexpr const char* kTracker = "tracker";
+constexpr std::size_t kObjectsWaiting = 256;
 /// Beyond this a place is a slip of the hand, and bad for the physics.
 constexpr double kFarthest_m = 100;
 constexpr std::size_t kSamplesWaiting = 64;
@@ -122,6 +125,7 @@ class RunningSession final : public Session {
         options_(options),
         joint_names_(robot.chain.joint_names()),
         home_(robot.home),
+        base_frame_(robot.chain.base_link()),
         world_(std::move(world)),
         follower_(robot.chain.limits(), robot.home, options.follower),
         noise_(options.noise.seed) {
@@ -129,6 +133,17 @@ class RunningSession final : public Session {
   }
 
   Status Connect(ircp::Bus& bus, const scene::Description& scene) {
+    if (options_.track_hz > 0) {
+      auto objects = bus.MakeWriter<ircp::ObjectSample>(kTracker);
+      if (!objects) return objects.error();
+      object_writer_ = std::move(objects).value();
+      tracked_ = std::make_unique<Outbox<ircp::ObjectSample>>(
+          kObjectsWaiting, [this](ircp::ObjectSample&& sample) {
+            if (Status status = object_writer_->Write(std::move(sample)); !status) {
+              log_.Warning("object not sent", {{"cause", status.error().message}});
+            }
+          });
+    }
     if (options_.cameras && !scene.cameras.empty()) {
       Result<std::unique_ptr<Cameras>> cameras = Cameras::Create(
           bus, log_, world_, scene,
@@ -173,6 +188,17 @@ class RunningSession final : public Session {
                   });
     if (!reader) return reader.error();
     leader_reader_ = std::move(reader).value();
+    if (options_.leader == Leader::kSuit && world_.has_hand()) {
+      // A person's glove: what it says of the hand's opening.
+      auto glove = bus.MakeReader<ircp::EndEffectorSample>(
+          [this](const ircp::EndEffectorSample& s, const ircp::Reception&) {
+            if (!s.has_hand_open || !std::isfinite(s.hand_open)) return;
+            const std::lock_guard lock(mutex_);
+            hand_open_ = std::clamp(s.hand_open, 0.0, 1.0);
+          });
+      if (!glove) return glove.error();
+      glove_reader_ = std::move(glove).value();
+    }
     if (options_.pace == 1 && options_.in_step_with.empty()) return {};
     auto time =
         ircp::TimeLeader::Create(bus, clock_, kProgram, {.in_step_with = options_.in_step_with});
@@ -194,6 +220,7 @@ class RunningSession final : public Session {
       RunInPace(stop);
     }
     states_->Finish();
+    if (tracked_) tracked_->Finish();
     control_->SetState("stopped", "asked to stop");
     log_.Info("stopped", {{"sim_time_s", ToSeconds(world_.time())}});
   }
@@ -254,6 +281,7 @@ class RunningSession final : public Session {
     now.time_s = ToSeconds(world_.time());
     now.mode = NameOf(follower_.mode());
     now.touch_n = world_.touch_n();
+    now.hand_open = world_.has_hand() ? world_.hand_open() : hand_open_;
     now.refused = refused_;
     now.stale = static_cast<std::uint64_t>(follower_.stale_count());
     now.slips = slips_;
@@ -271,6 +299,9 @@ class RunningSession final : public Session {
     std::vector<ircp::TopicCount> counts;
     if (cameras_) counts = cameras_->sent();
     counts.push_back({ircp::JointStateSample::kTopic, "robot", state_writer_->sent()});
+    if (object_writer_) {
+      counts.push_back({ircp::ObjectSample::kTopic, kTracker, object_writer_->sent()});
+    }
     return counts;
   }
 
@@ -288,6 +319,7 @@ class RunningSession final : public Session {
     TakeSamples();
     const Follower::Output target = follower_.At(world_.time() + world_.step());
     world_.SetTarget(target.positions, target.velocities);
+    world_.SetHand(hand_open_);
     world_.Step();
     SayClicks();
     const Stamp stamp = epoch + world_.time();
@@ -295,7 +327,33 @@ class RunningSession final : public Session {
       ++states_due_;
       states_->Put({State(stamp), follower_.mode()});
     }
+    if (tracked_ && ToSeconds(world_.time()) * options_.track_hz >= static_cast<double>(looks_)) {
+      ++looks_;
+      Track(stamp);
+    }
     if (cameras_) cameras_->Look(world_, stamp);
+  }
+
+  /// Where everything is that a skill may be about, with the tracker's noise.
+  void Track(Stamp stamp) {
+    const auto noise = [this](double deviation) {
+      const double x = noise_.Normal(0, deviation);
+      const double y = noise_.Normal(0, deviation);
+      return Eigen::Vector3d(x, y, noise_.Normal(0, deviation));
+    };
+    for (const ThingState& thing : world_.things()) {
+      ircp::ObjectSample sample;
+      sample.header.stamp = stamp;
+      sample.name = thing.name;
+      sample.frame = base_frame_;
+      sample.base_T_object = thing.base_T_object;
+      sample.base_T_object.translation += noise(options_.noise.object_m);
+      sample.base_T_object.rotation =
+          sample.base_T_object.rotation * geometry::ExpSo3(noise(options_.noise.object_rad));
+      sample.position_variance_m2.fill(options_.noise.object_m * options_.noise.object_m);
+      sample.rotation_variance_rad2 = options_.noise.object_rad * options_.noise.object_rad;
+      tracked_->Put(std::move(sample));
+    }
   }
 
   void TakeSamples() {
@@ -384,7 +442,7 @@ class RunningSession final : public Session {
     sample.velocities = list(world_.velocities());
     for (double& v : sample.velocities) v += noise_.Normal(0, options_.noise.velocity_rad_s);
     sample.efforts = list(world_.efforts());
-    sample.hand_open = hand_open_;
+    sample.hand_open = world_.has_hand() ? world_.hand_open() : hand_open_;
     sample.touch_sensors = {kTouchSensor};
     sample.touch_n = {world_.touch_n() + noise_.Normal(0, options_.noise.touch_n)};
     sample.command_seq = follower_.acted_seq();
@@ -442,6 +500,7 @@ class RunningSession final : public Session {
     values["sim_time_s"] = FormatFixed(now.time_s, 3);
     values["mode"] = now.mode;
     values["touch_n"] = FormatFixed(now.touch_n, 3);
+    values["hand_open"] = FormatFixed(now.hand_open, 3);
     values["samples_refused"] = std::to_string(now.refused);
     values["stale"] = std::to_string(now.stale);
     values["slips"] = std::to_string(now.slips);
@@ -451,10 +510,12 @@ class RunningSession final : public Session {
     const std::lock_guard lock(mutex_);
     for (const ButtonState& button : world_.buttons()) {
       values["clicks." + button.name] = std::to_string(button.clicks);
-      values["position." + button.name] = PoseText(button.base_T_object);
       if (button.clicks > 0) {
         values["last_click_s." + button.name] = FormatFixed(ToSeconds(button.last_click), 3);
       }
+    }
+    for (const ThingState& thing : world_.things()) {
+      values["position." + thing.name] = PoseText(thing.base_T_object);
     }
     return values;
   }
@@ -464,6 +525,7 @@ class RunningSession final : public Session {
   const SessionOptions options_;
   const std::vector<std::string> joint_names_;
   const Eigen::VectorXd home_;
+  const std::string base_frame_;
 
   mutable std::mutex mutex_;  ///< guards the world and what moves with it
   World world_;
@@ -473,6 +535,7 @@ class RunningSession final : public Session {
   std::vector<std::uint64_t> clicks_;                    ///< said so far, by button
   double hand_open_ = 1;
   std::int64_t states_due_ = 0;
+  std::int64_t looks_ = 0;  ///< of the tracker
   std::uint64_t refused_ = 0;
   std::uint64_t slips_ = 0;
 
@@ -484,12 +547,14 @@ class RunningSession final : public Session {
   std::unique_ptr<Cameras> cameras_;
   std::unique_ptr<ircp::Writer<ircp::JointStateSample>> state_writer_;
   std::unique_ptr<Outbox<Outgoing>> states_;
+  std::unique_ptr<ircp::Writer<ircp::ObjectSample>> object_writer_;  ///< null: nothing is tracked
+  std::unique_ptr<Outbox<ircp::ObjectSample>> tracked_;
   Follower::Mode said_mode_ = Follower::Mode::kHolding;  ///< of the outbox's thread
   std::unique_ptr<ircp::TimeLeader> time_;  ///< null: the world keeps pace with the clock
   std::atomic<bool> is_leading_{false};     ///< time_ stands
   // Last: their threads call into what stands above.
   std::unique_ptr<ircp::ControlServer> control_;
-  std::unique_ptr<ircp::Reader> leader_reader_;
+  std::unique_ptr<ircp::Reader> leader_reader_, glove_reader_;
 };
 
 }  // namespace
@@ -506,6 +571,11 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
   if (!(options.pace >= 0) || !std::isfinite(options.pace)) {
     return InvalidArgument("pace is " + FormatDouble(options.pace) + ", must be 0 or more", "pace");
   }
+  if (!(options.track_hz >= 0) || options.track_hz > 1 / ToSeconds(options.world.step)) {
+    return InvalidArgument(
+        "track rate is " + FormatDouble(options.track_hz) + " Hz, must be 0 to one a step",
+        "track-hz");
+  }
   if (options.command_delay < Duration(0)) {
     return InvalidArgument("command delay is " + FormatDouble(ToSeconds(options.command_delay)) +
                                " s, must not be negative",
@@ -513,7 +583,9 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
   }
   const std::pair<const char*, double> noises[] = {{"noise-position", options.noise.position_rad},
                                                    {"noise-velocity", options.noise.velocity_rad_s},
-                                                   {"noise-touch", options.noise.touch_n}};
+                                                   {"noise-touch", options.noise.touch_n},
+                                                   {"noise-object", options.noise.object_m},
+                                                   {"noise-object-turn", options.noise.object_rad}};
   for (const auto& noise : noises) {
     if (noise.second >= 0 && std::isfinite(noise.second)) continue;
     return InvalidArgument(std::string(noise.first) + " is " + FormatDouble(noise.second) +

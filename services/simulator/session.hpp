@@ -28,12 +28,17 @@ struct SensorNoise {
   double position_rad = 0;    ///< or m
   double velocity_rad_s = 0;  ///< or m/s
   double touch_n = 0;
+  double object_m = 0;    ///< of tracked things, along each axis
+  double object_rad = 0;  ///< likewise, about each axis
   std::uint64_t seed = 1;
 };
 
 struct SessionOptions {
   Leader leader = Leader::kCommand;
   double rate_hz = 125;  ///< of ircp/joint_state
+  /// Of ircp/objects: every button and object, as a tracking system would measure it; 0: none, and
+  /// cameras see what has a marker.
+  double track_hz = 0;
   bool cameras = true;
   /// "jpeg" or "png", and the former's quality.
   std::string picture_encoding = "jpeg";
@@ -58,6 +63,7 @@ struct Figures {
   double time_s = 0;  ///< simulated
   std::string mode;   ///< "holding", "following", "going home"
   double touch_n = 0;
+  double hand_open = 1;
   std::map<std::string, std::uint64_t> clicks;  ///< by button
   std::map<std::string, double> last_click_s;   ///< simulated; of those that clicked
   std::uint64_t refused = 0;                    ///< samples without sense for this robot
@@ -70,11 +76,12 @@ struct Figures {
 };
 
 /// Commands it answers (ircp/control.hpp, program "simulator"):
-///   place{object, x, y [, z] [, qx, qy, qz, qw]}  what is left out stays as it is
+///   place{object, x, y [, z] [, qx, qy, qz, qw]}  what is left out stays as it is; also obstacles
+///   and objects
 ///   home{}           back to the home posture at a gentle speed; the answer's `seconds` says when
 ///   reset_clicks{}
 /// Its status carries `sim_time_s`, `mode`, `clicks.<button>`, `last_click_s.<button>`,
-/// `position.<button>` ("x,y,z,qx,qy,qz,qw") and counts of what went wrong.
+/// `position.<button or object>` ("x,y,z,qx,qy,qz,qw"), `hand_open` and counts of what went wrong.
 class Session {
  public:
   /// `bus`, `clock` and `log` outlive the session.

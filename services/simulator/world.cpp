@@ -30,6 +30,8 @@ using DataPtr = std::unique_ptr<mjData, DataDeleter>;
 
 /// Overlap that still counts as placed beside the robot, not in it.
 constexpr double kAllowedOverlap = 1e-3;
+/// Likewise of a movable object in another thing: it is pushed out that far without a leap.
+constexpr double kAllowedSink = 2e-3;
 
 Result<ModelPtr> Load(const std::string& mjcf) {
   // MuJoCo writes warnings to a file in the working folder unless somebody takes them; World counts
@@ -92,6 +94,14 @@ struct Cart {
   Duration begin{0};
 };
 
+/// A hand's joint on its way to where it is told to be.
+struct HandDrive {
+  kinematics::Hand hand;
+  Drive drive;
+  double speed = 0;
+  double target = 0;  ///< of the joint
+};
+
 Drive MakeDrive(const mjModel& model, const kinematics::Joint& joint) {
   const std::string name = RobotJoint(joint.name);
   const int id = mj_name2id(&model, mjOBJ_JOINT, name.c_str());
@@ -117,6 +127,8 @@ struct World::Impl {
   std::vector<std::string> link_names;
   std::vector<ButtonParts> buttons;
   std::vector<Cart> carts;
+  std::optional<HandDrive> hand;
+  std::vector<std::pair<std::string, int>> things;  ///< buttons and objects, with their bodies
   std::int64_t steps = 0;
 
   Duration Now() const { return steps * options.step; }
@@ -179,8 +191,16 @@ struct World::Impl {
     for (const int j : robot.chain.joint_indices()) {
       chain.push_back(MakeDrive(*model, robot.model.joints[static_cast<std::size_t>(j)]));
     }
+    hand.reset();
+    if (robot.model.hand) {
+      const kinematics::Joint& joint =
+          robot.model.joints[static_cast<std::size_t>(robot.model.hand->joint)];
+      hand = {*robot.model.hand, MakeDrive(*model, joint), joint.limits.velocity,
+              robot.model.hand->open};
+    }
     buttons.clear();
     carts.clear();
+    things.clear();
     for (const scene::Button& button : scene.buttons) {
       ButtonParts parts;
       parts.name = button.name;
@@ -194,7 +214,11 @@ struct World::Impl {
                          .rail = *button.rail,
                          .base_p_start = button.base_T_object.translation});
       }
+      things.emplace_back(button.name, parts.body);
       buttons.push_back(std::move(parts));
+    }
+    for (const scene::Object& object : scene.objects) {
+      things.emplace_back(object.name, BodyId(*model, ThingBody(object.name)));
     }
     mj_forward(model.get(), data.get());
     return {};
@@ -209,6 +233,20 @@ struct World::Impl {
       range[0] = -drive.effort - bias;
       range[1] = drive.effort - bias;
     }
+  }
+
+  void MoveHand() {
+    if (!hand) return;
+    mjtNum& told = data->ctrl[hand->drive.actuator];
+    const double most = hand->speed * ToSeconds(options.step);
+    told += std::clamp(hand->target - told, -most, most);
+  }
+
+  /// Where the first of a free body's positions stands, or -1.
+  int FreePlace(int body) const {
+    const int joint = model->body_jntadr[body];
+    const bool is_free = joint >= 0 && model->jnt_type[joint] == mjJNT_FREE;
+    return is_free ? model->jnt_qposadr[joint] : -1;
   }
 
   void MoveCarts() {
@@ -284,8 +322,14 @@ void World::SetTarget(const Eigen::Ref<const Eigen::VectorXd>& positions,
   }
 }
 
+void World::SetHand(double opening) {
+  if (impl_->hand)
+    impl_->hand->target = impl_->hand->hand.PositionAt(std::clamp(opening, 0.0, 1.0));
+}
+
 void World::Step() {
   impl_->MoveCarts();
+  impl_->MoveHand();
   mj_step1(impl_->model.get(), impl_->data.get());
   impl_->CompensateBias();
   mj_step2(impl_->model.get(), impl_->data.get());
@@ -301,6 +345,14 @@ void World::MoveTo(const Eigen::Ref<const Eigen::VectorXd>& positions) {
   }
   SetTarget(positions, Eigen::VectorXd::Zero(positions.size()));
   mj_forward(impl_->model.get(), impl_->data.get());
+}
+
+bool World::has_hand() const { return impl_->hand.has_value(); }
+
+double World::hand_open() const {
+  if (!impl_->hand) return 1;
+  const HandDrive& hand = *impl_->hand;
+  return std::clamp(hand.hand.OpeningAt(impl_->data->qpos[hand.drive.qpos]), 0.0, 1.0);
 }
 
 Eigen::VectorXd World::positions() const {
@@ -383,8 +435,9 @@ Status World::Place(std::string_view thing, const geometry::Pose& base_T_thing) 
   const int body = BodyId(*w.model, ThingBody(std::string(thing)));
   if (body < 0) return NoSuchThing(thing);
   const int mocap = w.model->body_mocapid[body];
-  mjtNum* position = Row(w.data->mocap_pos, 3, mocap);
-  mjtNum* rotation = Row(w.data->mocap_quat, 4, mocap);
+  const int place = w.FreePlace(body);
+  mjtNum* position = place >= 0 ? w.data->qpos + place : Row(w.data->mocap_pos, 3, mocap);
+  mjtNum* rotation = place >= 0 ? position + 3 : Row(w.data->mocap_quat, 4, mocap);
   mjtNum before[7];
   std::copy_n(position, 3, before);
   std::copy_n(rotation, 4, before + 3);
@@ -394,26 +447,42 @@ Status World::Place(std::string_view thing, const geometry::Pose& base_T_thing) 
   const mjtNum quaternion[4] = {q.w(), q.x(), q.y(), q.z()};
   std::copy_n(quaternion, 4, rotation);
   mj_forward(w.model.get(), w.data.get());
-  const double overlap = w.Deepest([&](int a, int b) {
-    const bool a_is_thing = w.model->body_rootid[a] == body;
-    const bool b_is_thing = w.model->body_rootid[b] == body;
-    return (a_is_thing && w.is_robot[static_cast<std::size_t>(b)]) ||
-           (b_is_thing && w.is_robot[static_cast<std::size_t>(a)]);
-  });
-  if (overlap > kAllowedOverlap) {
+  const auto overlap_with = [&](bool robot) {
+    return w.Deepest([&](int a, int b) {
+      const bool a_is_thing = w.model->body_rootid[a] == body;
+      const bool b_is_thing = w.model->body_rootid[b] == body;
+      return (a_is_thing && w.is_robot[static_cast<std::size_t>(b)] == robot) ||
+             (b_is_thing && w.is_robot[static_cast<std::size_t>(a)] == robot);
+    });
+  };
+  const double in_robot = overlap_with(true);
+  const double in_things = place >= 0 ? overlap_with(false) : 0;
+  if (in_robot > kAllowedOverlap || in_things > kAllowedSink) {
     std::copy_n(before, 3, position);
     std::copy_n(before + 3, 4, rotation);
     mj_forward(w.model.get(), w.data.get());
-    return FailedPrecondition("\"" + std::string(thing) + "\" would stand in the robot, " +
-                                  std::to_string(std::lround(1000 * overlap)) + " mm deep",
-                              "object");
+    const bool robot = in_robot > kAllowedOverlap;
+    return FailedPrecondition(
+        "\"" + std::string(thing) + "\" would stand in " +
+            (robot ? "the robot, " : "another thing, ") +
+            std::to_string(std::lround(1000 * (robot ? in_robot : in_things))) + " mm deep",
+        "object");
   }
+  if (place >= 0) std::fill_n(w.data->qvel + w.model->jnt_dofadr[w.model->body_jntadr[body]], 6, 0);
   for (Cart& cart : w.carts) {
     if (cart.body != body) continue;
     cart.base_p_start = p;
     cart.begin = w.Now();
   }
   return {};
+}
+
+std::vector<ThingState> World::things() const {
+  std::vector<ThingState> states;
+  for (const auto& [name, body] : impl_->things) {
+    states.push_back({name, BodyPose(*impl_->data, body)});
+  }
+  return states;
 }
 
 Result<geometry::Pose> World::ThingPose(std::string_view thing) const {

@@ -26,7 +26,7 @@ struct WorldOptions {
 struct Snapshot {
   Duration time{0};
   std::vector<double> positions;    ///< MuJoCo's qpos
-  std::vector<double> thing_poses;  ///< x y z qw qx qy qz of each obstacle and button
+  std::vector<double> thing_poses;  ///< x y z qw qx qy qz of each thing that stays where it is put
 };
 
 struct ButtonState {
@@ -36,6 +36,12 @@ struct ButtonState {
   double spring_n = 0;  ///< with which the spring pushes back
   std::uint64_t clicks = 0;
   Duration last_click{0};  ///< simulated time; 0: never
+};
+
+/// A button or an object of the scene, where it is.
+struct ThingState {
+  std::string name;
+  geometry::Pose base_T_object;
 };
 
 /// Thread-compatible. Vectors are by chain joint, n = dof().
@@ -56,11 +62,17 @@ class World {
   /// What the servos follow from the next step on: positions (rad or m) and speeds.
   void SetTarget(const Eigen::Ref<const Eigen::VectorXd>& positions,
                  const Eigen::Ref<const Eigen::VectorXd>& velocities);
+  /// Where the hand goes, from 0 (closed) to 1 (open), as fast and as strong as its joint's limits
+  /// allow. Without a hand nothing happens.
+  void SetHand(double opening);
   /// One step of options.step.
   void Step();
   /// Puts the robot to rest at `positions` at once, the servos holding it there.
   void MoveTo(const Eigen::Ref<const Eigen::VectorXd>& positions);
 
+  bool has_hand() const;
+  /// As measured, 0 to 1; 1 without a hand.
+  double hand_open() const;
   Eigen::VectorXd positions() const;
   Eigen::VectorXd velocities() const;
   /// Torques or forces of the drives, gravity's part included.
@@ -74,11 +86,14 @@ class World {
 
   std::vector<ButtonState> buttons() const;
   void ResetClicks();
-  /// Moves an obstacle or a button; where it stands on a rail, that begins there. kNotFound;
-  /// kFailedPrecondition: it would stand in the robot.
+  /// Moves an obstacle, a button or an object; where it stands on a rail, that begins there. A
+  /// movable object comes to rest. kNotFound; kFailedPrecondition: it would stand in the robot, or
+  /// a movable object in something else.
   Status Place(std::string_view thing, const geometry::Pose& base_T_thing);
 
-  /// base_T_thing of an obstacle or a button. kNotFound.
+  /// What a skill may be about: buttons, then objects.
+  std::vector<ThingState> things() const;
+  /// base_T_thing of an obstacle, a button or an object. kNotFound.
   Result<geometry::Pose> ThingPose(std::string_view thing) const;
 
   Snapshot snapshot() const;

@@ -2,6 +2,7 @@
 // What a CollisionChecker is made of.
 
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,6 +30,12 @@ struct Snapshot {
   std::vector<Known> distances;  ///< one a pair
 };
 
+/// What a proof works with at one depth of its bisection.
+struct ProofLevel {
+  Snapshot middle;
+  std::vector<int> unproved;  ///< pairs
+};
+
 struct CollisionChecker::Impl {
   kinematics::RobotModel model;
   CheckerOptions options;
@@ -43,6 +50,10 @@ struct CollisionChecker::Impl {
   mutable std::vector<geometry::Pose> base_T_links;
   mutable Snapshot scratch;
   mutable std::vector<std::pair<double, int>> queue;
+  mutable Snapshot proof_low, proof_high;
+  mutable std::vector<int> proof_pairs;
+  mutable std::vector<std::unique_ptr<ProofLevel>> proof_levels;
+  mutable Eigen::VectorXd proof_q, proof_travel;
 
   /// Puts a scene and its parts, made of it, in place.
   void Take(Scene new_scene, std::vector<ScenePart> parts, std::vector<RobotPart> held);
@@ -68,6 +79,8 @@ struct CollisionChecker::Impl {
   /// Exact where less than `ignore_beyond_m`, else a lower bound of at least that.
   Separation Measure(const Pair& pair, const Snapshot& at,
                      double ignore_beyond_m = std::numeric_limits<double>::infinity()) const;
+  /// The pair that is nearest to itself as placed at `scratch`, and its distance; -1: none.
+  std::pair<int, double> Nearest(const std::vector<AllowedTouch>& allowed) const;
   Clearance Describe(int index, const Snapshot& at) const;
 
   /// Adds how fast a point of a link moves along `direction` with each joint. base_T_links are set.

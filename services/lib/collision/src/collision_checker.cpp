@@ -264,32 +264,43 @@ Status CollisionChecker::Detach(const std::string& object,
   return SetScene(std::move(scene));
 }
 
-Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                              const std::vector<AllowedTouch>& allowed) const {
-  const Impl& impl = *impl_;
-  impl.Place(q, impl.scratch);
-  impl.queue.clear();
-  for (std::size_t i = 0; i < impl.pairs.size(); ++i) {
-    if (!allowed.empty() && impl.IsAllowed(impl.pairs[i], allowed)) continue;
-    impl.queue.emplace_back(impl.TightBound(impl.pairs[i], impl.scratch), static_cast<int>(i));
+std::pair<int, double> CollisionChecker::Impl::Nearest(
+    const std::vector<AllowedTouch>& allowed) const {
+  queue.clear();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!allowed.empty() && IsAllowed(pairs[i], allowed)) continue;
+    queue.emplace_back(TightBound(pairs[i], scratch), static_cast<int>(i));
   }
-  std::make_heap(impl.queue.begin(), impl.queue.end(), std::greater<>());
+  std::make_heap(queue.begin(), queue.end(), std::greater<>());
   double smallest = kInfinity;
   int smallest_pair = -1;
-  while (!impl.queue.empty()) {
-    const auto [bound, index] = impl.queue.front();
+  while (!queue.empty()) {
+    const auto [bound, index] = queue.front();
     // Bounds that overlap say nothing about depth: all of those are measured.
-    if (bound >= smallest && bound > -impl.Padding(impl.pairs[index])) break;
-    std::pop_heap(impl.queue.begin(), impl.queue.end(), std::greater<>());
-    impl.queue.pop_back();
-    const double distance = impl.Measure(impl.pairs[index], impl.scratch, smallest).distance_m;
+    if (bound >= smallest && bound > -Padding(pairs[index])) break;
+    std::pop_heap(queue.begin(), queue.end(), std::greater<>());
+    queue.pop_back();
+    const double distance = Measure(pairs[index], scratch, smallest).distance_m;
     if (distance < smallest) {
       smallest = distance;
       smallest_pair = index;
     }
   }
-  if (smallest_pair < 0) return {{}, {}, kInfinity};
-  return impl.Describe(smallest_pair, impl.scratch);
+  return {smallest_pair, smallest};
+}
+
+Clearance CollisionChecker::SmallestClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                              const std::vector<AllowedTouch>& allowed) const {
+  impl_->Place(q, impl_->scratch);
+  const int pair = impl_->Nearest(allowed).first;
+  if (pair < 0) return {{}, {}, kInfinity};
+  return impl_->Describe(pair, impl_->scratch);
+}
+
+double CollisionChecker::SmallestDistance(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                          const std::vector<AllowedTouch>& allowed) const {
+  impl_->Place(q, impl_->scratch);
+  return impl_->Nearest(allowed).second;
 }
 
 double CollisionChecker::NearnessCost(const Eigen::Ref<const Eigen::VectorXd>& q, double margin_m,

@@ -8,13 +8,20 @@ Scene MakeScene(const scene::Description& description,
   for (const scene::Obstacle& obstacle : description.obstacles) {
     scene.objects.push_back({obstacle.name, obstacle.base_T_shape, obstacle.shape});
   }
-  for (const scene::Button& button : description.buttons) {
-    geometry::Pose base_T_object = button.base_T_object;
+  const auto as_seen = [&](const std::string& name, geometry::Pose base_T_object) {
     for (const geometry::NamedPose& seen : objects) {
-      if (seen.name != button.name) continue;
+      if (seen.name != name) continue;
       base_T_object.translation = seen.base_T_object.translation;
       if (seen.has_orientation) base_T_object.rotation = seen.base_T_object.rotation;
     }
+    return base_T_object;
+  };
+  for (const scene::Object& object : description.objects) {
+    scene.objects.push_back(
+        {object.name, as_seen(object.name, object.base_T_object), object.shape});
+  }
+  for (const scene::Button& button : description.buttons) {
+    const geometry::Pose base_T_object = as_seen(button.name, button.base_T_object);
     // From the cap's upper face down to the foot of the housing.
     geometry::Pose object_T_shape;
     object_T_shape.translation =

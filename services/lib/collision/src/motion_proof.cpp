@@ -12,30 +12,56 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A pair that moves by no more than this between two places is not looked at more finely.
 constexpr double kSmallestMotion_m = 1e-4;
 
+/// A pair that is too near at a place of the path.
+struct Place {
+  const Snapshot* at = nullptr;
+  int pair = -1;
+};
+
+/// Works with the scratch of the checker, so that proofs one after the other do not allocate.
 class Proof {
  public:
   Proof(const CollisionChecker::Impl& impl, const JointPath& path, double required_m)
-      : impl_(impl),
-        path_(path),
-        required_m_(required_m),
-        q_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(impl.model.joints.size()))),
-        travel_(q_) {}
-
-  Snapshot At(double s) {
-    Snapshot at;
-    at.s = s;
-    path_.Position(s, q_);
-    impl_.Place(q_, at);
-    at.distances.resize(impl_.pairs.size());
-    return at;
+      : impl_(impl), path_(path), required_m_(required_m) {
+    impl_.proof_q.setZero(static_cast<Eigen::Index>(impl.model.joints.size()));
+    impl_.proof_travel.setZero(impl_.proof_q.size());
   }
 
-  /// The first violation by one of the pairs between two places.
-  std::optional<Violation> Search(Snapshot& low, Snapshot& high,
-                                  const std::vector<int>& candidates) {
-    travel_.setZero();
-    path_.Travel(low.s, high.s, travel_);
-    std::vector<int> unproved;
+  /// All between two places.
+  std::optional<Place> Search(double begin, double end, const std::vector<AllowedTouch>& allowed) {
+    impl_.proof_pairs.clear();
+    for (std::size_t i = 0; i < impl_.pairs.size(); ++i) {
+      if (impl_.IsAllowed(impl_.pairs[i], allowed)) continue;
+      impl_.proof_pairs.push_back(static_cast<int>(i));
+    }
+    PlaceAt(begin, impl_.proof_low);
+    PlaceAt(end, impl_.proof_high);
+    return Search(impl_.proof_low, impl_.proof_high, impl_.proof_pairs, 0);
+  }
+
+ private:
+  void PlaceAt(double s, Snapshot& at) {
+    at.s = s;
+    path_.Position(s, impl_.proof_q);
+    impl_.Place(impl_.proof_q, at);
+    at.distances.assign(impl_.pairs.size(), {});
+  }
+
+  ProofLevel& Level(std::size_t depth) {
+    if (depth == impl_.proof_levels.size()) {
+      impl_.proof_levels.push_back(std::make_unique<ProofLevel>());
+    }
+    return *impl_.proof_levels[depth];
+  }
+
+  /// The first place between two where one of the pairs is too near, or may be.
+  std::optional<Place> Search(Snapshot& low, Snapshot& high, const std::vector<int>& candidates,
+                              std::size_t depth) {
+    impl_.proof_travel.setZero();
+    path_.Travel(low.s, high.s, impl_.proof_travel);
+    ProofLevel& level = Level(depth);
+    std::vector<int>& unproved = level.unproved;
+    unproved.clear();
     double worst = kInfinity;
     int worst_pair = -1;
     bool worst_at_low = false;
@@ -43,12 +69,14 @@ class Proof {
     for (const int index : candidates) {
       const Pair& pair = impl_.pairs[index];
       double motion = 0;
-      for (const Lever& lever : pair.levers) motion += lever.length * travel_[lever.joint];
+      for (const Lever& lever : pair.levers) {
+        motion += lever.length * impl_.proof_travel[lever.joint];
+      }
       const double needed = 2 * required_m_ + motion;
       if (impl_.LowerBound(pair, low) + impl_.LowerBound(pair, high) >= needed) continue;
       if (impl_.TightBound(pair, low) + impl_.TightBound(pair, high) >= needed) continue;
       const double at_low = Measured(index, low, needed);
-      if (at_low < required_m_) return Violation{low.s, impl_.Describe(index, low)};
+      if (at_low < required_m_) return Place{&low, index};
       const double at_high = Measured(index, high, needed);
       if (at_low + at_high >= needed && at_high >= required_m_) continue;
       unproved.push_back(index);
@@ -62,15 +90,15 @@ class Proof {
     if (unproved.empty()) return std::nullopt;
     const double middle_s = 0.5 * (low.s + high.s);
     if (!still_moves || !(low.s < middle_s && middle_s < high.s)) {
-      Snapshot& worst_end = worst_at_low ? low : high;
-      return Violation{worst_end.s, impl_.Describe(worst_pair, worst_end)};
+      return Place{worst_at_low ? &low : &high, worst_pair};
     }
-    Snapshot middle = At(middle_s);
-    if (std::optional<Violation> found = Search(low, middle, unproved)) return found;
-    return Search(middle, high, unproved);
+    PlaceAt(middle_s, level.middle);
+    if (const std::optional<Place> found = Search(low, level.middle, unproved, depth + 1)) {
+      return found;
+    }
+    return Search(level.middle, high, unproved, depth + 1);
   }
 
- private:
   /// A lower bound of the distance of a pair, exact unless it is `enough_m` or more.
   double Measured(int index, Snapshot& at, double enough_m) const {
     Snapshot::Known& known = at.distances[index];
@@ -83,8 +111,6 @@ class Proof {
   const CollisionChecker::Impl& impl_;
   const JointPath& path_;
   double required_m_;
-  Eigen::VectorXd q_;
-  Eigen::VectorXd travel_;
 };
 
 }  // namespace
@@ -92,14 +118,16 @@ class Proof {
 std::optional<Violation> CollisionChecker::FirstViolation(
     const JointPath& path, double begin, double end, double required_clearance_m,
     const std::vector<AllowedTouch>& allowed) const {
-  std::vector<int> candidates;
-  for (std::size_t i = 0; i < impl_->pairs.size(); ++i) {
-    if (!impl_->IsAllowed(impl_->pairs[i], allowed)) candidates.push_back(static_cast<int>(i));
-  }
-  Proof proof(*impl_, path, required_clearance_m);
-  Snapshot low = proof.At(begin);
-  Snapshot high = proof.At(end);
-  return proof.Search(low, high, candidates);
+  const std::optional<Place> place =
+      Proof(*impl_, path, required_clearance_m).Search(begin, end, allowed);
+  if (!place) return std::nullopt;
+  return Violation{place->at->s, impl_->Describe(place->pair, *place->at)};
+}
+
+bool CollisionChecker::KeepsClear(const JointPath& path, double begin, double end,
+                                  double required_clearance_m,
+                                  const std::vector<AllowedTouch>& allowed) const {
+  return !Proof(*impl_, path, required_clearance_m).Search(begin, end, allowed);
 }
 
 }  // namespace exemplar::collision

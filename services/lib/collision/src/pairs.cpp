@@ -48,6 +48,17 @@ int ParentWithParts(const RobotModel& model, const std::vector<bool>& has_parts,
   return -1;
 }
 
+/// Whether the hand's joint, or one that follows it, moves the link: fingers, which close onto each
+/// other.
+bool IsFinger(const RobotModel& model, int link) {
+  if (!model.hand) return false;
+  const std::vector<int> above = JointsAbove(model, link);
+  return std::any_of(above.begin(), above.end(), [&](int joint) {
+    const std::optional<kinematics::Mimic>& mimic = model.joints[joint].mimic;
+    return joint == model.hand->joint || (mimic && mimic->joint == model.hand->joint);
+  });
+}
+
 /// `offset` without its component along a revolute joint's own axis, which turning cannot move.
 double OffsetAcross(const kinematics::Joint& joint, const Eigen::Vector3d& offset) {
   return (offset - offset.dot(joint.axis) * joint.axis).norm();
@@ -184,6 +195,7 @@ Result<std::vector<std::pair<int, int>>> CheckedLinkPairs(
   for (int a = 0; a < links; ++a) {
     for (int b = a + 1; b < links; ++b) {
       if (!has_parts[a] || !has_parts[b]) continue;
+      if (IsFinger(model, a) && IsFinger(model, b)) continue;
       if (std::find(allowed_links.begin(), allowed_links.end(), std::pair(a, b)) !=
           allowed_links.end()) {
         continue;

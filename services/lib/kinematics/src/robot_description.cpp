@@ -52,15 +52,22 @@ class DescriptionReader {
     Result<std::optional<LinkPairs>> allowed = ReadAllowedPairs(root, *model);
     if (!allowed) return allowed.error();
     if (Status status = ReadConvexMeshes(root, *model); !status) return status.error();
+    ServoGains hand_servo;
+    if (Status status = ReadHand(root["hand"], *chain, *model, hand_servo); !status) {
+      return status.error();
+    }
     return RobotDescription{
         model->name,       folder_,          std::move(*model), std::move(*chain),
-        std::move(*touch), std::move(*home), std::move(*servo), std::move(*allowed)};
+        std::move(*touch), std::move(*home), std::move(*servo), std::move(*allowed),
+        hand_servo};
   }
 
  private:
-  static constexpr std::array<std::string_view, 10> kKeys = {
-      "urdf",        "srdf", "convex_meshes", "base", "tip",
+  static constexpr std::array<std::string_view, 11> kKeys = {
+      "urdf",        "srdf", "convex_meshes", "base", "tip",  "hand",
       "touch_links", "home", "acceleration",  "jerk", "servo"};
+  static constexpr std::array<std::string_view, 6> kHandKeys = {"joint", "closed",    "open",
+                                                                "force", "stiffness", "damping"};
   static constexpr std::array<std::string_view, 2> kServoKeys = {"stiffness", "damping"};
 
   Error At(const YAML::Node& node, const std::string& what) const {
@@ -221,6 +228,51 @@ class DescriptionReader {
     return servo;
   }
 
+  Status ReadHand(const YAML::Node& map, const Chain& chain, RobotModel& model,
+                  ServoGains& servo) const {
+    if (!map) return {};
+    if (!map.IsMap()) return At(map, "hand must hold joint, closed and open");
+    if (Status known = CheckKeys(map, "hand: ", kHandKeys); !known) return known;
+    const YAML::Node joint = map["joint"];
+    if (!joint || !joint.IsScalar()) return At(map, "hand.joint must name a joint");
+    std::vector<std::string> names;
+    for (const Joint& one : model.joints) names.push_back(one.name);
+    Result<int> index = IndexOf(joint, "hand.joint", joint.Scalar(), names);
+    if (!index) return index.error();
+    Joint& moved = model.joints[static_cast<std::size_t>(*index)];
+    const auto& in_chain = chain.joint_indices();
+    if (moved.type == JointType::kFixed || moved.mimic ||
+        std::find(in_chain.begin(), in_chain.end(), *index) != in_chain.end()) {
+      return At(joint, "hand.joint: " + Quoted(moved.name) +
+                           " must move, by itself, and not belong to the chain");
+    }
+    Hand hand{*index, 0, 0};
+    for (const auto& [key, value] :
+         {std::pair("closed", &Hand::closed), std::pair("open", &Hand::open)}) {
+      const std::string place = std::string("hand.") + key;
+      if (!map[key]) return At(map, place + " is missing");
+      Result<double> position = ReadNumber(map[key], place);
+      if (!position) return position.error();
+      if (*position < moved.limits.lower || *position > moved.limits.upper) {
+        return At(map[key], place + " is " + FormatDouble(*position) + ", outside its limits " +
+                                FormatDouble(moved.limits.lower) + " to " +
+                                FormatDouble(moved.limits.upper));
+      }
+      hand.*value = *position;
+    }
+    if (hand.open == hand.closed) return At(map, "hand.open must differ from hand.closed");
+    for (const auto& [key, value] :
+         {std::pair("force", &moved.limits.effort), std::pair("stiffness", &servo.stiffness),
+          std::pair("damping", &servo.damping)}) {
+      if (!map[key]) continue;
+      Result<double> number = ReadPositive(map[key], std::string("hand.") + key);
+      if (!number) return number.error();
+      *value = *number;
+    }
+    model.hand = hand;
+    return {};
+  }
+
   Result<std::optional<LinkPairs>> ReadAllowedPairs(const YAML::Node& root,
                                                     const RobotModel& model) const {
     if (!root["srdf"]) return std::optional<LinkPairs>();
@@ -290,12 +342,24 @@ Eigen::VectorXd FullJointVector(const RobotModel& model, const Chain& chain,
             : std::max(joint.limits.lower, std::min(0.0, joint.limits.upper));
   }
   for (int i = 0; i < chain.dof(); ++i) full[chain.joint_indices()[i]] = q[i];
+  if (model.hand) full[model.hand->joint] = model.hand->open;
   for (std::size_t i = 0; i < model.joints.size(); ++i) {
     if (const std::optional<Mimic>& mimic = model.joints[i].mimic) {
       full[static_cast<Eigen::Index>(i)] = mimic->multiplier * full[mimic->joint] + mimic->offset;
     }
   }
   return full;
+}
+
+void SetHandOpening(const RobotModel& model, double opening, Eigen::Ref<Eigen::VectorXd> full) {
+  if (!model.hand) return;
+  const int hand = model.hand->joint;
+  full[hand] = model.hand->PositionAt(std::clamp(opening, 0.0, 1.0));
+  for (std::size_t i = 0; i < model.joints.size(); ++i) {
+    const std::optional<Mimic>& mimic = model.joints[i].mimic;
+    if (!mimic || mimic->joint != hand) continue;
+    full[static_cast<Eigen::Index>(i)] = mimic->multiplier * full[hand] + mimic->offset;
+  }
 }
 
 }  // namespace exemplar::kinematics

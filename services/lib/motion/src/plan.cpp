@@ -61,6 +61,13 @@ Status CheckInput(const SkillMotion& motion, const kinematics::RobotModel& model
                              "motion.base_T_tool");
     }
   }
+  if (!motion.hand_open.empty() &&
+      (motion.hand_open.size() != frames ||
+       !std::all_of(motion.hand_open.begin(), motion.hand_open.end(),
+                    [](double open) { return open >= 0 && open <= 1; }))) {
+    return InvalidArgument("the hand's opening is not one a frame, or not between 0 and 1",
+                           "motion.hand_open");
+  }
   if (!motion.joint_names.empty() &&
       (motion.joints.rows() != static_cast<Eigen::Index>(frames) ||
        motion.joints.cols() != static_cast<Eigen::Index>(motion.joint_names.size()) ||
@@ -311,6 +318,20 @@ std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
   return {*first, *last};
 }
 
+/// The opening that the skill has at each frame, taken to the trajectory's times.
+void AddHand(const SkillMotion& motion, const std::vector<double>& frame_time_s,
+             JointTrajectory& trajectory) {
+  if (motion.hand_open.empty()) return;
+  std::size_t k = 0;
+  for (const double t : trajectory.time_s) {
+    while (k + 2 < frame_time_s.size() && frame_time_s[k + 1] < t) ++k;
+    const double r =
+        std::clamp((t - frame_time_s[k]) / (frame_time_s[k + 1] - frame_time_s[k]), 0.0, 1.0);
+    trajectory.hand_open.push_back(motion.hand_open[k] +
+                                   r * (motion.hand_open[k + 1] - motion.hand_open[k]));
+  }
+}
+
 void AddContacts(const SkillMotion& motion, const kinematics::Chain& chain,
                  const PlanOptions& options, const std::vector<double>& frame_time_s,
                  double offset_s, PlannedMotion& plan) {
@@ -359,6 +380,9 @@ void MeasureClearance(const JointTrajectory& trajectory, const kinematics::Robot
     });
     for (int j = 0; j < chain.dof(); ++j) {
       q[chain.joint_indices()[j]] = trajectory.positions(static_cast<Eigen::Index>(i), j);
+    }
+    if (!trajectory.hand_open.empty()) {
+      kinematics::SetHandOpening(model, trajectory.hand_open[i], q);
     }
     const collision::Clearance clearance =
         checker.SmallestClearance(q, stretch == stretches.end() ? none : stretch->allowed);
@@ -417,8 +441,9 @@ class Planner {
     if (!followed.ok()) return followed.error();
 
     std::vector<double> frame_time_s;
-    const JointTrajectory skill = TimePath(prepared_.path.time_s, path.joints, chain_.joint_names(),
-                                           chain_.limits(), options_.speed_scale, frame_time_s);
+    JointTrajectory skill = TimePath(prepared_.path.time_s, path.joints, chain_.joint_names(),
+                                     chain_.limits(), options_.speed_scale, frame_time_s);
+    AddHand(motion_, frame_time_s, skill);
     const std::vector<std::string> touch_links = TouchLinks();
     std::vector<collision::AllowedTouch> touches;
     for (const demonstration::Contact& contact : motion_.contacts) {

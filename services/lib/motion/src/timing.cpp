@@ -279,6 +279,10 @@ JointTrajectory Concatenate(const JointTrajectory& first, const JointTrajectory&
   for (Eigen::Index i = 1; i <= more; ++i) {
     out.time_s.push_back(first.duration_s() + second.time_s[i] - second.time_s.front());
   }
+  if (!second.hand_open.empty()) {
+    out.hand_open.resize(first.time_s.size(), second.hand_open.front());
+    out.hand_open.insert(out.hand_open.end(), second.hand_open.begin() + 1, second.hand_open.end());
+  }
   return out;
 }
 

@@ -43,9 +43,20 @@ void Evaluate(const JointTrajectory& trajectory, double time_s,
   }
 }
 
+double EvaluateHand(const JointTrajectory& trajectory, double time_s) {
+  assert(!trajectory.hand_open.empty());
+  const std::vector<double>& time = trajectory.time_s;
+  if (time.size() < 2 || time_s <= time.front()) return trajectory.hand_open.front();
+  if (time_s >= time.back()) return trajectory.hand_open.back();
+  const auto i = static_cast<std::size_t>(PieceAt(time, time_s));
+  const double r = (time_s - time[i]) / (time[i + 1] - time[i]);
+  return trajectory.hand_open[i] + r * (trajectory.hand_open[i + 1] - trajectory.hand_open[i]);
+}
+
 TrajectoryPath::TrajectoryPath(const JointTrajectory& trajectory,
                                const kinematics::RobotModel& model, const kinematics::Chain& chain)
     : trajectory_(trajectory),
+      model_(model),
       chain_(chain),
       others_(kinematics::FullJointVector(model, chain, Eigen::VectorXd::Zero(chain.dof()))),
       travel_(Eigen::MatrixXd::Zero(trajectory.positions.rows(), trajectory.positions.cols())),
@@ -57,17 +68,44 @@ TrajectoryPath::TrajectoryPath(const JointTrajectory& trajectory,
           travel_(i, j) + TravelWithin(i, j, trajectory.time_s[i], trajectory.time_s[i + 1]);
     }
   }
+  if (!model.hand || trajectory.hand_open.empty()) return;
+  hand_travel_.assign(trajectory.time_s.size(), 0);
+  for (std::size_t i = 1; i < hand_travel_.size(); ++i) {
+    hand_travel_[i] =
+        hand_travel_[i - 1] + std::abs(trajectory.hand_open[i] - trajectory.hand_open[i - 1]);
+  }
 }
 
 void TrajectoryPath::Position(double s, Eigen::Ref<Eigen::VectorXd> q) const {
   Evaluate(trajectory_, s, position_, velocity_);
   q = others_;
   for (int j = 0; j < chain_.dof(); ++j) q[chain_.joint_indices()[j]] = position_[j];
+  if (!hand_travel_.empty()) {
+    kinematics::SetHandOpening(model_, EvaluateHand(trajectory_, s), q);
+  }
+}
+
+double TrajectoryPath::HandTravelTo(double time_s) const {
+  const std::vector<double>& time = trajectory_.time_s;
+  if (time_s >= time.back()) return hand_travel_.back();
+  const auto i = static_cast<std::size_t>(PieceAt(time, time_s));
+  const double r = std::max(0.0, (time_s - time[i]) / (time[i + 1] - time[i]));
+  return hand_travel_[i] + r * (hand_travel_[i + 1] - hand_travel_[i]);
 }
 
 void TrajectoryPath::Travel(double s0, double s1, Eigen::Ref<Eigen::VectorXd> travel) const {
   const std::vector<double>& time = trajectory_.time_s;
   if (time.size() < 2 || s1 <= time.front() || s0 >= time.back()) return;
+  if (!hand_travel_.empty()) {
+    const double way =
+        (HandTravelTo(s1) - HandTravelTo(s0)) * std::abs(model_.hand->open - model_.hand->closed);
+    travel[model_.hand->joint] = way;
+    for (std::size_t i = 0; i < model_.joints.size(); ++i) {
+      const std::optional<kinematics::Mimic>& mimic = model_.joints[i].mimic;
+      if (!mimic || mimic->joint != model_.hand->joint) continue;
+      travel[static_cast<Eigen::Index>(i)] = std::abs(mimic->multiplier) * way;
+    }
+  }
   const Eigen::Index first = PieceAt(time, s0);
   const Eigen::Index last = PieceAt(time, s1);
   for (int j = 0; j < chain_.dof(); ++j) {

@@ -19,11 +19,15 @@ class TrajectoryPath final : public collision::JointPath {
 
  private:
   double TravelWithin(Eigen::Index piece, Eigen::Index joint, double begin_s, double end_s) const;
+  /// Of the opening, from the first frame.
+  double HandTravelTo(double time_s) const;
 
   const JointTrajectory& trajectory_;
+  const kinematics::RobotModel& model_;
   const kinematics::Chain& chain_;
-  Eigen::VectorXd others_;  ///< the model's joints, those of the chain at 0
-  Eigen::MatrixXd travel_;  ///< frames x joints: from the first frame
+  Eigen::VectorXd others_;           ///< the model's joints, those of the chain at 0
+  Eigen::MatrixXd travel_;           ///< frames x joints: from the first frame
+  std::vector<double> hand_travel_;  ///< likewise of the opening; empty: the hand stays open
   mutable Eigen::VectorXd position_, velocity_;
 };
 

@@ -137,23 +137,27 @@ Eigen::Vector4d Project(const scene::StereoCamera& camera, const Eigen::Vector3d
           centre.x() + f * (left_p.x() - camera.baseline_m) / left_p.z(), y};
 }
 
-ObjectFinder::ObjectFinder(scene::StereoCamera camera, std::vector<Marked> marked,
+ObjectFinder::ObjectFinder(scene::StereoCamera camera, std::vector<scene::Marked> marked,
                            FinderOptions options)
     : camera_(std::move(camera)), marked_(std::move(marked)), options_(options) {}
 
 Result<ObjectFinder> ObjectFinder::Create(scene::StereoCamera camera,
                                           const std::vector<scene::Button>& buttons,
                                           FinderOptions options) {
-  std::vector<Marked> marked;
+  scene::Description scene;
+  scene.buttons = buttons;
+  return Create(std::move(camera), scene::MarkedThings(scene), options);
+}
+
+Result<ObjectFinder> ObjectFinder::Create(scene::StereoCamera camera,
+                                          std::vector<scene::Marked> marked,
+                                          FinderOptions options) {
   std::set<int> ids;
-  for (const scene::Button& button : buttons) {
-    if (!button.marker) continue;
-    if (!ids.insert(button.marker->id).second) {
-      return InvalidArgument("marker id " + std::to_string(button.marker->id) + " of \"" +
-                                 button.name + "\" is on another object too",
-                             "buttons");
-    }
-    marked.push_back({button.name, *button.marker});
+  for (const scene::Marked& thing : marked) {
+    if (ids.insert(thing.marker.id).second) continue;
+    return InvalidArgument("marker id " + std::to_string(thing.marker.id) + " of \"" + thing.name +
+                               "\" is on another object too",
+                           "buttons");
   }
   if (marked.empty()) {
     return InvalidArgument("no button of the scene has a marker: there is nothing to find",
@@ -178,7 +182,7 @@ Result<Findings> ObjectFinder::Find(const Picture& left, const Picture& right) c
 Findings ObjectFinder::FindFromCorners(const std::vector<DetectedMarker>& left,
                                        const std::vector<DetectedMarker>& right) const {
   Findings findings;
-  for (const Marked& marked : marked_) {
+  for (const scene::Marked& marked : marked_) {
     const DetectedMarker* in_left = perception::Find(left, marked.marker.id);
     const DetectedMarker* in_right = perception::Find(right, marked.marker.id);
     if (in_left == nullptr && in_right == nullptr) continue;

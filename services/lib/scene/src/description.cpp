@@ -1,5 +1,6 @@
 #include "exemplar/scene/description.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -112,6 +113,22 @@ Button ReadButton(Findings& findings, const MapReader& map) {
   return button;
 }
 
+Object ReadObject(Findings& findings, const MapReader& map, const std::filesystem::path& folder) {
+  Object object{map.Text("name"), ReadPose(map), ReadShape(map, folder)};
+  object.fixed = map.Flag("fixed", object.fixed);
+  if (object.fixed && map.Has("mass")) map.Complain("mass", "does not belong to a fixed object");
+  if (!object.fixed && std::holds_alternative<kinematics::Mesh>(object.shape)) {
+    map.Complain("shape", "only a fixed object may be a mesh");
+  }
+  object.mass_kg = map.Number("mass", object.mass_kg, Range::kPositive);
+  object.friction = map.Number("friction", object.friction, Range::kPositive);
+  if (map.Has("marker")) {
+    object.marker = ReadMarker(MapReader(findings, map.Child("marker"), map.PathOf("marker"),
+                                         {"id", "size", "position", "quaternion"}));
+  }
+  return object;
+}
+
 /// Optical frame from where the camera stands and what it looks at.
 Eigen::Quaterniond LookAt(const MapReader& map, const Eigen::Vector3d& position) {
   const Eigen::Vector3d target = map.Vector("look_at", std::nullopt);
@@ -167,7 +184,7 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
   Description description;
   if (document.IsNull()) return description;
   const MapReader top(findings, document, "",
-                      {"obstacles", "clouds", "held", "buttons", "cameras"});
+                      {"obstacles", "clouds", "held", "buttons", "objects", "cameras"});
   std::set<std::string> things;
   std::set<std::string> cameras;
   const auto claim = [](std::set<std::string>& names, const MapReader& map,
@@ -206,6 +223,14 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
     claim(things, map, button.name);
     description.buttons.push_back(std::move(button));
   });
+  top.List("objects", [&](const YAML::Node& node, const std::string& path) {
+    const MapReader map(findings, node, path,
+                        {"name", "shape", "size", "radius", "length", "mesh", "scale", "convex",
+                         "position", "quaternion", "mass", "friction", "fixed", "marker"});
+    Object object = ReadObject(findings, map, folder);
+    claim(things, map, object.name);
+    description.objects.push_back(std::move(object));
+  });
   top.List("cameras", [&](const YAML::Node& node, const std::string& path) {
     const MapReader map(findings, node, path,
                         {"name", "position", "quaternion", "look_at", "up", "baseline", "width",
@@ -215,11 +240,14 @@ Result<Description> Parse(std::string_view yaml, std::string_view source,
     description.cameras.push_back(std::move(camera));
   });
   std::set<int> ids;
-  for (const Button& button : description.buttons) {
-    if (button.marker && !ids.insert(button.marker->id).second) {
-      top.Complain("buttons", "marker id " + std::to_string(button.marker->id) + " of \"" +
-                                  button.name + "\" is on another button too");
-    }
+  for (const Marked& marked : MarkedThings(description)) {
+    if (ids.insert(marked.marker.id).second) continue;
+    const bool on_object =
+        std::any_of(description.objects.begin(), description.objects.end(),
+                    [&](const Object& object) { return object.name == marked.name; });
+    top.Complain(on_object ? "objects" : "buttons",
+                 "marker id " + std::to_string(marked.marker.id) + " of \"" + marked.name +
+                     "\" is on another " + (on_object ? "thing" : "button") + " too");
   }
   if (!findings.ok()) return findings.error();
   return description;
@@ -232,6 +260,17 @@ double StereoCamera::focal_px() const { return 0.5 * height / std::tan(0.5 * fov
 double Rail::WayAt(double time_s) const {
   const double way = std::fmod(speed_m_s * time_s, 2 * length_m);
   return way > length_m ? 2 * length_m - way : way;
+}
+
+std::vector<Marked> MarkedThings(const Description& description) {
+  std::vector<Marked> marked;
+  for (const Button& button : description.buttons) {
+    if (button.marker) marked.push_back({button.name, *button.marker});
+  }
+  for (const Object& object : description.objects) {
+    if (object.marker) marked.push_back({object.name, *object.marker});
+  }
+  return marked;
 }
 
 Result<Description> ParseDescription(std::string_view yaml, std::string_view source) {

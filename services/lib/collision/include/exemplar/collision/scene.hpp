@@ -48,9 +48,9 @@ struct Scene {
   std::vector<HeldObject> held = {};
 };
 
-/// The obstacles, clouds, held objects and the buttons' housings of a description; `objects`
-/// replaces the poses of buttons of the same name (where they are seen now). A button is one body
-/// of its own name.
+/// The obstacles, objects, clouds, held objects and the buttons' housings of a description;
+/// `objects` replaces the poses of objects and buttons of the same name (where they are seen now).
+/// A button is one body of its own name.
 Scene MakeScene(const scene::Description& description,
                 const std::vector<geometry::NamedPose>& objects = {});
 
@@ -99,7 +99,8 @@ struct Violation {
 };
 
 /// Checks a robot against itself and a scene. Left out are: links with no moving joint between
-/// them, neighbours in the tree (links without collision geometry skipped), links that touch in
+/// them, neighbours in the tree (links without collision geometry skipped), a hand's fingers
+/// against each other, links that touch in
 /// every sampled state, and links that no joint moves against the scene. Construction is slow,
 /// queries fast. Thread-compatible: one instance a thread.
 class CollisionChecker {
@@ -127,6 +128,10 @@ class CollisionChecker {
   Clearance SmallestClearance(const Eigen::Ref<const Eigen::VectorXd>& q,
                               const std::vector<AllowedTouch>& allowed = {}) const;
 
+  /// The distance alone. Does not allocate after the first call (where FCL is not needed).
+  double SmallestDistance(const Eigen::Ref<const Eigen::VectorXd>& q,
+                          const std::vector<AllowedTouch>& allowed = {}) const;
+
   /// What nearness costs: the sum over all pairs of bodies of the square of what their distance
   /// lacks to `margin_m`; 0 where everything is farther apart. Bodies count by their convex shapes.
   /// `gradient` (by joint index of the model, as q), where wanted.
@@ -150,6 +155,11 @@ class CollisionChecker {
   std::optional<Violation> FirstViolation(const JointPath& path, double begin, double end,
                                           double required_clearance_m,
                                           const std::vector<AllowedTouch>& allowed = {}) const;
+
+  /// Whether there is no such place: for loops that may not allocate. After the first calls this
+  /// does not (where FCL is not needed).
+  bool KeepsClear(const JointPath& path, double begin, double end, double required_clearance_m,
+                  const std::vector<AllowedTouch>& allowed = {}) const;
 
   struct Impl;  ///< opaque
 

@@ -14,6 +14,9 @@
 //   acceleration: {default: 5.0, joint1: 3.0}   # rad/s^2
 //   jerk: {default: 200.0, joint1: 100.0}           # rad/s^3
 //   servo: {default: {stiffness: 400, damping: 40}, joint1: {...}}   # for the simulator
+//   hand: {joint: left_finger, closed: 0, open: 0.04, force: 30, stiffness: 2000, damping: 60}
+//                         # optional: a joint beside the chain that opens and closes a hand; force
+//                         # (N or N m, default: the URDF's effort) is the most it presses with
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -44,14 +47,19 @@ struct RobotDescription {
   Eigen::VectorXd home;           ///< n = chain.dof()
   std::vector<ServoGains> servo;  ///< one a chain joint
   std::optional<LinkPairs> allowed_pairs = {};  ///< of the SRDF, where there is one
+  ServoGains hand_servo = {};                   ///< of model.hand's joint, where there is one
 };
 
 /// Errors name file, line and key.
 Result<RobotDescription> ReadRobotDescription(const std::filesystem::path& folder);
 
-/// The model's full joint vector (as LinkPoses takes it) with the chain's joints at `q`, others at
-/// 0 or the limit nearest to 0.
+/// The model's full joint vector (as LinkPoses takes it) with the chain's joints at `q`, a hand
+/// open, others at 0 or the limit nearest to 0.
 Eigen::VectorXd FullJointVector(const RobotModel& model, const Chain& chain,
                                 const Eigen::Ref<const Eigen::VectorXd>& q);
+
+/// Puts the hand's joint, and what follows it by mimic, to an opening from 0 (closed) to 1 (open).
+/// Does nothing without a hand; does not allocate.
+void SetHandOpening(const RobotModel& model, double opening, Eigen::Ref<Eigen::VectorXd> full);
 
 }  // namespace exemplar::kinematics

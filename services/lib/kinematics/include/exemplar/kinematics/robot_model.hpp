@@ -92,12 +92,25 @@ struct Joint {
   std::optional<Mimic> mimic;
 };
 
+/// A hand that opens and closes by one joint of the model; others follow that by mimic. No chain
+/// moves it.
+struct Hand {
+  int joint = -1;     ///< index into RobotModel::joints
+  double closed = 0;  ///< the joint's position (rad or m), within its limits
+  double open = 0;    ///< likewise; not `closed`
+
+  /// Where the joint stands at an opening from 0 (closed) to 1 (open), and back.
+  double PositionAt(double opening) const { return closed + opening * (open - closed); }
+  double OpeningAt(double position) const { return (position - closed) / (open - closed); }
+};
+
 /// A tree of links. Links and joints are ordered so that parents come before children; link 0 is
 /// the root.
 struct RobotModel {
   std::string name;
   std::vector<Link> links;
   std::vector<Joint> joints;
+  std::optional<Hand> hand = {};  ///< robot.yaml says which
 
   int FindLink(std::string_view name) const;   ///< -1 when there is none
   int FindJoint(std::string_view name) const;  ///< -1 when there is none

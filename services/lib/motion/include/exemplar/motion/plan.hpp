@@ -20,8 +20,9 @@ namespace exemplar::motion {
 struct JointTrajectory {
   std::vector<std::string> joint_names;
   std::vector<double> time_s;
-  Eigen::MatrixXd positions;   ///< frames x joints
-  Eigen::MatrixXd velocities;  ///< frames x joints
+  Eigen::MatrixXd positions;           ///< frames x joints
+  Eigen::MatrixXd velocities;          ///< frames x joints
+  std::vector<double> hand_open = {};  ///< one a frame, from 0 (closed) to 1 (open), or empty
 
   double duration_s() const { return time_s.empty() ? 0.0 : time_s.back(); }
 };
@@ -31,6 +32,9 @@ struct JointTrajectory {
 /// joints.
 void Evaluate(const JointTrajectory& trajectory, double time_s,
               Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity);
+
+/// The hand's opening at `time_s`, linear between frames, held outside. Precondition: there is one.
+double EvaluateHand(const JointTrajectory& trajectory, double time_s);
 
 struct PlanOptions {
   double position_tolerance_m = 1e-4;  ///< in contact; elsewhere `free_tolerance_m`

@@ -38,11 +38,13 @@ struct Findings {
   int implausible = 0;  ///< seen by both, but no rigid marker in front of the camera fits
 };
 
-/// Finds the marked buttons of a scene. Immutable, so thread-safe.
+/// Finds the marked buttons and objects of a scene. Immutable, so thread-safe.
 class ObjectFinder {
  public:
   static Result<ObjectFinder> Create(scene::StereoCamera camera,
                                      const std::vector<scene::Button>& buttons,
+                                     FinderOptions options = {});
+  static Result<ObjectFinder> Create(scene::StereoCamera camera, std::vector<scene::Marked> marked,
                                      FinderOptions options = {});
 
   /// Pictures of another size than the camera's are an error.
@@ -54,14 +56,11 @@ class ObjectFinder {
   const scene::StereoCamera& camera() const { return camera_; }
 
  private:
-  struct Marked {
-    std::string name;
-    scene::Marker marker;
-  };
-  ObjectFinder(scene::StereoCamera camera, std::vector<Marked> marked, FinderOptions options);
+  ObjectFinder(scene::StereoCamera camera, std::vector<scene::Marked> marked,
+               FinderOptions options);
 
   scene::StereoCamera camera_;
-  std::vector<Marked> marked_;
+  std::vector<scene::Marked> marked_;
   FinderOptions options_;
 };
 

@@ -26,6 +26,10 @@
 //       rail: {direction: [0, 1, 0], length: 0.3, speed: 0.1}  # it stands on a cart, which goes
 //       from
 //                               # its position so far and back, for ever; at most 0.2 m/s
+//   objects:                      # may be pushed and held, unless `fixed`
+//     - {name: block, shape: box, size: [0.04, 0.04, 0.05], position: [0.5, -0.2, 0.025],
+//        mass: 0.15, friction: 0.9, marker: {id: 3, size: 0.03, position: [0, 0, 0.0251]}}
+//     - {name: tray, shape: box, size: [0.1, 0.1, 0.004], position: [0.5, 0.2, 0.002], fixed: true}
 //   cameras:
 //     - {name: stereo, position: [0.6, 0, 1.2], look_at: [0.6, 0, 0], up: [1, 0, 0], baseline: 0.1,
 //        width: 640, height: 480, fovy_deg: 50, rate_hz: 10}
@@ -94,6 +98,17 @@ struct Button {
   std::optional<Rail> rail = {};
 };
 
+/// Something that a robot may push or hold. Its frame is its shape's: origin in the middle.
+struct Object {
+  std::string name;
+  geometry::Pose base_T_object;  ///< at first
+  kinematics::Shape shape;       ///< a mesh only where it is fixed
+  double mass_kg = 0.2;
+  double friction = 0.8;  ///< Coulomb's, against everything
+  bool fixed = false;     ///< stays where it is put
+  std::optional<Marker> marker = {};
+};
+
 /// A rectified stereo pair: the right camera is `baseline_m` along the left camera's +x.
 struct StereoCamera {
   std::string name;
@@ -114,7 +129,15 @@ struct Description {
   std::vector<StereoCamera> cameras;
   std::vector<Cloud> clouds = {};
   std::vector<Held> held = {};
+  std::vector<Object> objects = {};
 };
+
+/// What cameras can tell from everything else, by its marker.
+struct Marked {
+  std::string name;
+  Marker marker;
+};
+std::vector<Marked> MarkedThings(const Description& description);
 
 /// Errors name file, line and key; unknown keys are errors with the nearest known one.
 Result<Description> ReadDescription(const std::filesystem::path& file);
