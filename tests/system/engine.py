@@ -1,0 +1,135 @@
+"""A Docker engine of a test's own: its networks, mounts and processes lie in namespaces that end with it.
+
+So nothing that its containers send leaves them, and whatever happens, nothing of them stays. Only building images uses
+the machine's network, for Debian's packages.
+"""
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import time
+
+from processes import ROOT
+
+COMPOSE = ROOT / "deploy" / "compose.yaml"
+NEEDED = ("dockerd", "containerd", "docker-compose", "debootstrap", "tini", "nsenter", "unshare", "iptables")
+
+
+class Unavailable(Exception):
+    """Why no engine can run here."""
+
+
+def check():
+    """Raises Unavailable where an engine cannot run."""
+    missing = [name for name in NEEDED if not shutil.which(name, path="/usr/sbin:/usr/bin:/sbin:/bin")]
+    if missing:
+        raise Unavailable(f"not installed: {', '.join(missing)} (Debian: docker.io docker-compose debootstrap tini iptables)")
+    if os.geteuid() != 0:
+        raise Unavailable("needs root")
+
+
+class Engine:
+    """dockerd with its files under `folder`; `alone`: in network, mount and process namespaces of its own."""
+
+    def __init__(self, folder, alone):
+        self.folder, self.alone = pathlib.Path(folder), alone
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.socket = self.folder / "docker.sock"
+        self.environment = {**os.environ, "DOCKER_HOST": f"unix://{self.socket}", "PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
+
+    def __enter__(self):
+        command = ["dockerd", "--data-root", self.folder / "data", "--exec-root", self.folder / "exec", "--pidfile", self.folder / "pid"]
+        command += ["--host", f"unix://{self.socket}", "--bridge=none", "--iptables=false", "--ip6tables=false", "--cgroup-parent=/exemplar-test"]
+        if self.alone:
+            # A process namespace ends with its first process, and everything in it.
+            isolated = ["unshare", "--net", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "tini", "-g", "--"]
+            command = [*isolated, *command]
+        for stale in ("pid", "docker.sock"):
+            (self.folder / stale).unlink(missing_ok=True)
+        shutil.rmtree(self.folder / "exec", ignore_errors=True)
+        with open(self.folder / "dockerd.log", "w", encoding="utf-8") as log:
+            self.process = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log, env=self.environment)
+        deadline = time.monotonic() + 60
+        while subprocess.run(["docker", "version"], env=self.environment, capture_output=True, check=False).returncode != 0:
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                tail = (self.folder / "dockerd.log").read_text(encoding="utf-8").splitlines()[-5:]
+                self.__exit__()
+                raise Unavailable("dockerd does not run here: " + " / ".join(tail))
+            time.sleep(0.2)
+        if self.alone:
+            self.inside("ip", "link", "set", "lo", "up")
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            # unshare hands no signal on: its child does the work.
+            target = self._first() if self.alone else self.process.pid
+            if target:
+                subprocess.run(["kill", "-TERM", str(target)], check=False)
+            try:
+                self.process.wait(40)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+        for group in pathlib.Path("/sys/fs/cgroup").glob("*/exemplar-test"):
+            for inner in [*sorted(group.glob("*/"), reverse=True), group]:
+                try:
+                    inner.rmdir()
+                except OSError:
+                    pass
+
+    def _first(self):
+        """The process that holds the namespaces, or None while there is none."""
+        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text(encoding="ascii").split()
+        return children[0] if children else None
+
+    def inside(self, *words, **more):
+        """Runs a command in the engine's namespaces; its output."""
+        return run("nsenter", "-t", self._first(), "-n", "-m", "-p", *words, **more)
+
+    def docker(self, *words):
+        return run("docker", *words, env=self.environment)
+
+
+class Station:
+    """The containers of deploy/compose.yaml, under an engine."""
+
+    def __init__(self, engine, override, environment):
+        self.engine = engine
+        self.files = ["-f", COMPOSE, "-f", override]
+        self.environment = {**engine.environment, "COMPOSE_PROJECT_NAME": "exemplar", **environment}
+
+    def compose(self, *words, timeout=180, **environment):
+        command = ["docker-compose", *self.files, "--profile", "demo", *words]
+        return run(*command, env={**self.environment, **environment}, timeout=timeout)
+
+    def inspect(self, service, all_of_it=False):
+        name = f"exemplar_{service}_1"
+        found = json.loads(self.engine.docker("inspect", name))[0]
+        return found if all_of_it else found["State"]
+
+    def healthy(self, *services):
+        def well(state):
+            return state["Running"] and not state["Paused"] and state.get("Health", {}).get("Status") == "healthy"
+
+        return all(well(self.inspect(service)) for service in services)
+
+    def signal(self, service, name):
+        """Straight to the program, past the engine: to it the container just died."""
+        self.engine.inside("kill", f"-{name}", self.inspect(service)["Pid"])
+
+    def within(self, service, *words):
+        """Runs a command of this machine in the network of a container."""
+        return self.engine.inside("nsenter", "-t", self.inspect(service)["Pid"], "-n", *words)
+
+    def logs(self, service):
+        return self.compose("logs", "--no-color", "--tail", "40", service)
+
+
+def run(*words, timeout=120, **more):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=timeout, check=False, **more)
+    if done.returncode != 0:
+        raise AssertionError(f"{' '.join(str(word) for word in words)}: exit {done.returncode}: {(done.stderr or done.stdout).strip()[-1500:]}")
+    return done.stdout
