@@ -8,6 +8,7 @@ find_package(SQLite3 REQUIRED)
 find_package(OpenSSL 3 REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(tinyxml2 REQUIRED)
+find_package(Boost 1.74 REQUIRED)  # its headers only: Beast
 find_library(ZSTD_LIB zstd REQUIRED)
 find_library(LZ4_LIB lz4 REQUIRED)
 add_library(compression::zstd UNKNOWN IMPORTED GLOBAL)

@@ -90,7 +90,8 @@ class WebSocket {
  public:
   struct Sent {
     bool open = true;  ///< false: the connection is closed or closing, nothing was queued
-    std::vector<std::uint64_t> dropped;  ///< tags of frames that went for this one, maybe its own
+    std::vector<std::uint64_t> dropped =
+        {};  ///< tags of frames that went for this one, maybe its own
   };
   virtual ~WebSocket() = default;
   /// Queues a frame; never waits. A client whose queue of frames that must not be dropped is full
@@ -122,7 +123,7 @@ class WebSocketSession {
 
 struct WebSocketEndpoint {
   /// In the order of preference. A client that offers none of them is refused (400).
-  std::vector<std::string> subprotocols;
+  std::vector<std::string> subprotocols = {};
   std::size_t message_bytes = 1 << 20;  ///< the longest that a client may send
   std::size_t queue_bytes = 16 << 20;   ///< of droppable frames that wait for one client
   std::size_t queue_frames = 4096;
@@ -130,7 +131,7 @@ struct WebSocketEndpoint {
   Duration silence = std::chrono::seconds(20);  ///< then a ping; as long again: closed
   std::size_t clients = 128;
   /// Makes the session of a client that has just connected; nullptr refuses it (1013).
-  std::function<std::unique_ptr<WebSocketSession>(std::shared_ptr<WebSocket>)> open;
+  std::function<std::unique_ptr<WebSocketSession>(std::shared_ptr<WebSocket>)> open = {};
 };
 
 /// Since the server was made.
