@@ -10,6 +10,7 @@
 #include <ifaddrs.h>
 #include <netinet/in.h>
 #include <sys/statvfs.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -217,6 +218,14 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
 
   dds::DomainParticipantQos qos;
   qos.name(options.name);
+  // Told to all who discover it, for `exemplar doctor`.
+  char host[256] = {};
+  ::gethostname(host, sizeof host - 1);
+  for (const auto& [name, value] :
+       {std::pair<std::string, std::string>{"exemplar.version", EXEMPLAR_VERSION},
+        {"exemplar.host", host}}) {
+    qos.properties().properties().emplace_back(name, value, true);
+  }
   rtps::DiscoverySettings& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(kLeaseSeconds, 0);
   discovery.leaseDuration_announcementperiod =

@@ -16,6 +16,7 @@
 #include "byte_endpoints.hpp"
 #include "exemplar/base/log.hpp"
 #include "fastdds_parts.hpp"
+#include "rtps_names.hpp"
 
 namespace exemplar::bus {
 namespace {
@@ -45,16 +46,6 @@ struct Discovered {
   RawTopic topic;
   Kind kind;
 };
-
-/// The user data if it is a schema: other middlewares put their own things there.
-std::string SchemaFrom(const std::vector<rtps::octet>& user_data) {
-  std::string text(user_data.begin(), user_data.end());
-  const bool printable = std::none_of(text.begin(), text.end(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return byte < 0x20 && c != '\n' && c != '\t' && c != '\r';
-  });
-  return printable && text.find("struct ") != std::string::npos ? text : std::string();
-}
 
 /// 0 where the writer promises none.
 Duration DeadlineFrom(const eprosima::fastrtps::Duration_t& period) {
