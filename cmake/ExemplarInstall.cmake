@@ -15,5 +15,7 @@ install(DIRECTORY "${CMAKE_SOURCE_DIR}/proto" DESTINATION "${EXEMPLAR_SHARE}" CO
   FILES_MATCHING PATTERN "*.proto")
 foreach(component runtime-services clients development)
   install(FILES "${CMAKE_SOURCE_DIR}/LICENSE" "${CMAKE_SOURCE_DIR}/CHANGELOG.md"
-    DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT ${component})
+    DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/exemplar-${component}" COMPONENT ${component})
 endforeach()
+
+include(ExemplarPackages)

@@ -61,7 +61,7 @@ class OldStoreTest(unittest.TestCase):
         self.check_all_is_there(server)
         process.send_signal(signal.SIGTERM)
         self.assertEqual(process.wait(20), 0)
-        self.assertEqual(self.schema(), 2)
+        self.assertGreater(self.schema(), 1)
         _, server = self.start()
         self.check_all_is_there(server)
         # The next version goes on counting where the former program was.
@@ -73,7 +73,7 @@ class OldStoreTest(unittest.TestCase):
         process, _ = self.start()
         process.kill()
         process.wait()
-        self.assertEqual(self.schema(), 2)
+        self.assertGreater(self.schema(), 1)
         _, server = self.start()
         self.check_all_is_there(server)
 

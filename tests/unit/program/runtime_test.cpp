@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <set>
 
 namespace exemplar::program {
 namespace {
@@ -63,6 +66,37 @@ TEST(MetricsServerTest, RefusesAnAddressThatIsNone) {
   const auto server = MetricsServer::Create("nowhere", {});
   ASSERT_FALSE(server.ok());
   EXPECT_THAT(server.error().message, testing::HasSubstr("\"nowhere\" is not HOST:PORT"));
+}
+
+TEST(SignalsTest, TellsItsServiceManagerThatItIsReadyAndAlive) {
+  const std::string path = testing::TempDir() + "exemplar_notify_socket";
+  unlink(path.c_str());
+  const int fd = socket(AF_UNIX, SOCK_DGRAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  ASSERT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  setenv("NOTIFY_SOCKET", path.c_str(), 1);
+  setenv("WATCHDOG_USEC", "20000000", 1);
+  const timeval patience{10, 0};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  std::multiset<std::string> heard;
+  {
+    const Signals signals;
+    signals.token();
+    signals.token();
+    for (int message = 0; message < 2; ++message) {
+      char buffer[64];
+      const ssize_t n = recv(fd, buffer, sizeof buffer, 0);
+      ASSERT_GT(n, 0);
+      heard.emplace(buffer, static_cast<std::size_t>(n));
+    }
+  }
+  unsetenv("NOTIFY_SOCKET");
+  unsetenv("WATCHDOG_USEC");
+  close(fd);
+  unlink(path.c_str());
+  EXPECT_EQ(heard, (std::multiset<std::string>{"READY=1", "WATCHDOG=1"}));
 }
 
 TEST(LogTest, WritesOneJsonObjectALine) {

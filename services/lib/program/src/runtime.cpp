@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "exemplar/base/clock.hpp"
+#include "service_manager.hpp"
 
 namespace exemplar::program {
 namespace {
@@ -90,6 +91,7 @@ std::unique_ptr<Log> MakeLog(const CommonOptions& options, const std::string& pr
 
 struct Signals::Impl {
   std::stop_source stop;
+  std::once_flag ready;
   std::jthread waiter;
 };
 
@@ -102,15 +104,28 @@ Signals::Signals() : impl_(std::make_unique<Impl>()) {
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   impl_->waiter = std::jthread([stop = impl_->stop, set](const std::stop_token& quit) mutable {
     const timespec moment{0, 50'000'000};
+    const std::chrono::microseconds period = WatchdogPeriod();
+    auto next = std::chrono::steady_clock::now();
     while (!quit.stop_requested()) {
-      if (sigtimedwait(&set, nullptr, &moment) > 0) stop.request_stop();
+      if (sigtimedwait(&set, nullptr, &moment) > 0) {
+        NotifyServiceManager("STOPPING=1");
+        stop.request_stop();
+      }
+      if (period.count() > 0 && std::chrono::steady_clock::now() >= next) {
+        NotifyServiceManager("WATCHDOG=1");
+        next += period;
+      }
     }
   });
 }
 
 Signals::~Signals() = default;
 
-std::stop_token Signals::token() const { return impl_->stop.get_token(); }
+std::stop_token Signals::token() const {
+  // Programs ask for it when all else is made.
+  std::call_once(impl_->ready, NotifyServiceManager, "READY=1");
+  return impl_->stop.get_token();
+}
 
 void Signals::Wait() const {
   std::mutex mutex;

@@ -21,6 +21,8 @@ std::unique_ptr<Log> MakeLog(const CommonOptions& options, const std::string& pr
 
 /// A stop token that SIGTERM and SIGINT trigger; SIGPIPE is ignored. Create one, first thing in
 /// main, before any thread starts (the signals are blocked and waited for by a thread of its own).
+/// Under systemd it also says that the program is ready (when the token is first asked for), that
+/// it is alive (WatchdogSec=) and that it stops.
 class Signals {
  public:
   Signals();
