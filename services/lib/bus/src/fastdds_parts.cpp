@@ -23,6 +23,7 @@
 #include <sstream>
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/security/station.hpp"
 
 namespace exemplar::bus {
 namespace {
@@ -99,6 +100,13 @@ Status CheckOptions(const ParticipantOptions& options) {
         "station \"" + options.station + "\" must be 1 to 200 characters without any of * ? [ ]",
         "station");
   }
+  if (!options.security.empty() && !options.discovery_servers.empty()) {
+    return InvalidArgument(
+        "a secured participant cannot use a discovery server: Fast DDS 2.9 aborts or never "
+        "matches; "
+        "use multicast or peers",
+        "discovery-server");
+  }
   if (options.name.size() > kMaxNameBytes) {
     return InvalidArgument("participant name \"" + options.name + "\" is longer than 200 bytes",
                            "name");
@@ -148,6 +156,32 @@ Result<DiscoveryServers> FindDiscoveryServers(const std::vector<std::string>& ad
     servers.push_back(found.front());
   }
   return servers;
+}
+
+/// DDS-Security with the files of a member's folder.
+Status Secure(const ParticipantOptions& options, dds::DomainParticipantQos& qos) {
+  if (options.security.empty()) return {};
+  const Status checked =
+      security::CheckMemberFolder(options.security, options.station, SystemClock().Now());
+  if (!checked) return checked;
+  const security::MemberFiles files = security::FilesOf(options.security);
+  const auto set = [&qos](const std::string& name, const std::string& value) {
+    qos.properties().properties().emplace_back("dds.sec." + name, value);
+  };
+  const auto set_file = [&set](const std::string& name, const std::filesystem::path& file) {
+    set(name, "file://" + std::filesystem::absolute(file).string());
+  };
+  set("auth.plugin", "builtin.PKI-DH");
+  set_file("auth.builtin.PKI-DH.identity_ca", files.authority);
+  set_file("auth.builtin.PKI-DH.identity_certificate", files.certificate);
+  set_file("auth.builtin.PKI-DH.identity_crl", files.revocations);
+  set_file("auth.builtin.PKI-DH.private_key", files.key);
+  set("access.plugin", "builtin.Access-Permissions");
+  set_file("access.builtin.Access-Permissions.permissions_ca", files.authority);
+  set_file("access.builtin.Access-Permissions.governance", files.governance);
+  set_file("access.builtin.Access-Permissions.permissions", files.permissions);
+  set("crypto.plugin", "builtin.AES-GCM-GMAC");
+  return {};
 }
 
 }  // namespace
@@ -218,6 +252,7 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
 
   dds::DomainParticipantQos qos;
   qos.name(options.name);
+  if (Status secured = Secure(options, qos); !secured.ok()) return secured.error();
   // Told to all who discover it, for `exemplar doctor`.
   char host[256] = {};
   ::gethostname(host, sizeof host - 1);
@@ -255,8 +290,12 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
       dds::DomainParticipantFactory::get_instance()->create_participant(
           static_cast<dds::DomainId_t>(options.domain), qos, listener, dds::StatusMask::none());
   if (participant == nullptr) {
+    const std::string others = options.security.empty()
+                                   ? "are too many running on this machine already?"
+                                   : "does the station's CRL name its own certificate, or do too "
+                                     "many run on this machine already?";
     return Unavailable("Fast DDS made no participant in domain " + std::to_string(options.domain) +
-                       ": are too many running on this machine already?");
+                       ": " + others);
   }
   return ParticipantPtr(participant);
 }
