@@ -158,4 +158,80 @@ Result<api::RobotStatus> FromProto(const v1::GetRobotStatusResponse& message) {
   return status;
 }
 
+void ToProto(const api::TeleoperationRequest& request, v1::TeleoperateRequest* message) {
+  message->set_suit(Utf8(request.suit));
+  ToProto(request.touch, message->mutable_touch());
+  message->set_detached(request.detached);
+}
+
+api::TeleoperationRequest FromProto(const v1::TeleoperateRequest& message) {
+  return {message.suit(), FromProto(message.touch()), message.detached()};
+}
+
+void ToProto(const api::TeleoperationFeedback& feedback, v1::TeleoperationFeedback* message) {
+  message->set_state(Utf8(feedback.state));
+  message->set_phase(Utf8(feedback.phase));
+  message->set_detail(Utf8(feedback.detail));
+  message->set_time_s(feedback.time_s);
+  message->set_behind_rad(feedback.behind_rad);
+  message->set_behind_joint(Utf8(feedback.behind_joint));
+  message->set_tracking_error_rad(feedback.tracking_error_rad);
+  message->set_touch_n(feedback.touch_n);
+  if (feedback.clearance_m) message->set_clearance_m(*feedback.clearance_m);
+  message->set_suit_rate_hz(feedback.suit_rate_hz);
+}
+
+api::TeleoperationFeedback FromProto(const v1::TeleoperationFeedback& message) {
+  api::TeleoperationFeedback feedback;
+  feedback.state = message.state();
+  feedback.phase = message.phase();
+  feedback.detail = message.detail();
+  feedback.time_s = message.time_s();
+  feedback.behind_rad = message.behind_rad();
+  feedback.behind_joint = message.behind_joint();
+  feedback.tracking_error_rad = message.tracking_error_rad();
+  feedback.touch_n = message.touch_n();
+  if (message.has_clearance_m()) feedback.clearance_m = message.clearance_m();
+  feedback.suit_rate_hz = message.suit_rate_hz();
+  return feedback;
+}
+
+void ToProto(const api::TeleoperationResult& result, v1::TeleoperationResult* message) {
+  message->set_state(Utf8(result.state));
+  message->set_detail(Utf8(result.detail));
+  message->set_duration_s(result.duration_s);
+  message->set_following_s(result.following_s);
+  message->set_suit_samples(result.suit_samples);
+  message->set_suit_samples_left_out(result.suit_samples_left_out);
+  message->set_commands_sent(result.commands_sent);
+  message->set_holds(result.holds);
+  message->set_blocks(result.blocks);
+  message->set_tracking_error_rad(result.tracking_error_rad);
+  if (result.clearance_m) message->set_clearance_m(*result.clearance_m);
+  message->set_touch_max_n(result.touch_max_n);
+  message->set_latency_p50_s(result.latency_p50_s);
+  message->set_latency_p99_s(result.latency_p99_s);
+  message->set_latency_max_s(result.latency_max_s);
+}
+
+api::TeleoperationResult FromProto(const v1::TeleoperationResult& message) {
+  api::TeleoperationResult result;
+  result.state = message.state();
+  result.detail = message.detail();
+  result.duration_s = message.duration_s();
+  result.following_s = message.following_s();
+  result.suit_samples = message.suit_samples();
+  result.suit_samples_left_out = message.suit_samples_left_out();
+  result.commands_sent = message.commands_sent();
+  result.holds = message.holds();
+  result.blocks = message.blocks();
+  result.tracking_error_rad = message.tracking_error_rad();
+  if (message.has_clearance_m()) result.clearance_m = message.clearance_m();
+  result.touch_max_n = message.touch_max_n();
+  result.latency_p50_s = message.latency_p50_s();
+  result.latency_p99_s = message.latency_p99_s();
+  result.latency_max_s = message.latency_max_s();
+  return result;
+}
+
 }  // namespace exemplar::rpc

@@ -20,4 +20,13 @@ Result<api::ExecutionResult> FromProto(const v1::ExecutionResult& message);
 void ToProto(const api::RobotStatus& status, v1::GetRobotStatusResponse* message);
 Result<api::RobotStatus> FromProto(const v1::GetRobotStatusResponse& message);
 
+void ToProto(const api::TeleoperationRequest& request, v1::TeleoperateRequest* message);
+api::TeleoperationRequest FromProto(const v1::TeleoperateRequest& message);
+
+void ToProto(const api::TeleoperationFeedback& feedback, v1::TeleoperationFeedback* message);
+api::TeleoperationFeedback FromProto(const v1::TeleoperationFeedback& message);
+
+void ToProto(const api::TeleoperationResult& result, v1::TeleoperationResult* message);
+api::TeleoperationResult FromProto(const v1::TeleoperationResult& message);
+
 }  // namespace exemplar::rpc

@@ -59,6 +59,29 @@ class ExecutorClient final : public api::ExecutorApi {
     request.set_factor(factor);
     return Do(&Stub::SetSpeed, request);
   }
+  Result<api::TeleoperationResult> Teleoperate(
+      const api::TeleoperationRequest& teleoperation,
+      const std::function<void(const api::TeleoperationFeedback&)>& feedback,
+      std::stop_token stop) override {
+    v1::TeleoperateRequest request;
+    ToProto(teleoperation, &request);
+    const auto context = connection_->Begin(Connection::Length::kLong);
+    const CancelOnStop cancel(*context, std::move(stop));
+    const auto reader = stub_.Teleoperate(context.get(), request);
+    v1::TeleoperateResponse last;
+    v1::TeleoperateResponse response;
+    while (reader->Read(&response)) {
+      if (response.has_feedback() && feedback) feedback(FromProto(response.feedback()));
+      last.Swap(&response);
+    }
+    const grpc::Status status = reader->Finish();
+    if (!status.ok()) return FromGrpc(status, connection_->address());
+    if (!last.has_result()) return Internal(connection_->address() + " sent no result");
+    return FromProto(last.result());
+  }
+  Status EndTeleoperation() override {
+    return Do(&Stub::EndTeleoperation, v1::EndTeleoperationRequest());
+  }
 
  private:
   template <class Method, class Request>

@@ -7,21 +7,25 @@
 namespace exemplar::rpc {
 namespace {
 
-/// Motions that outlive the call that began them. Thread-safe.
-class DetachedMotions {
+/// Work that outlives the call that began it. Thread-safe.
+template <class Answer>
+class DetachedRuns {
  public:
-  DetachedMotions(ServerShared& shared, api::ExecutorApi& executor)
-      : shared_(shared), executor_(executor) {}
+  using Tell = std::function<void(Answer)>;
+  using Work = std::function<Result<Answer>(const Tell& tell, std::stop_token stop)>;
 
-  /// Returns when the robot moves, or with what came instead.
-  Result<api::ExecutionResult> Begin(const api::ExecuteRequest& request) {
+  explicit DetachedRuns(ServerShared& shared) : shared_(shared) {}
+
+  /// Returns what the work tells first, or ends with.
+  Result<Answer> Begin(Work work) {
     const auto progress = std::make_shared<Progress>();
     {
       const std::lock_guard lock(mutex_);
-      std::erase_if(motions_, [](const Motion& motion) { return motion.progress->Ended(); });
-      motions_.push_back({progress, std::jthread([this, request, progress](std::stop_token stop) {
-                            Run(request, *progress, std::move(stop));
-                          })});
+      std::erase_if(runs_, [](const Run& run) { return run.progress->Ended(); });
+      runs_.push_back(
+          {progress, std::jthread([this, work = std::move(work), progress](std::stop_token stop) {
+             Do(work, *progress, std::move(stop));
+           })});
     }
     return progress->Wait();
   }
@@ -29,66 +33,58 @@ class DetachedMotions {
  private:
   class Progress {
    public:
-    void Feed(const api::ExecutionFeedback& now) {
-      if (now.state != "executing") return;
-      api::ExecutionResult moving;
-      moving.state = now.state;
-      moving.plan.duration_s = now.duration_s;
-      Tell(std::move(moving));
+    void Tell(Result<Answer> answer) {
+      const std::lock_guard lock(mutex_);
+      if (first_) return;
+      first_ = std::move(answer);
+      told_.notify_all();
     }
-    void End(Result<api::ExecutionResult> result) {
-      Tell(std::move(result));
+    void End(Result<Answer> answer) {
+      Tell(std::move(answer));
       ended_ = true;
     }
     bool Ended() const { return ended_; }
-    Result<api::ExecutionResult> Wait() {
+    Result<Answer> Wait() {
       std::unique_lock lock(mutex_);
       told_.wait(lock, [this] { return first_.has_value(); });
       return *first_;
     }
 
    private:
-    void Tell(Result<api::ExecutionResult> result) {
-      const std::lock_guard lock(mutex_);
-      if (first_) return;
-      first_ = std::move(result);
-      told_.notify_all();
-    }
     std::mutex mutex_;
     std::condition_variable told_;
-    std::optional<Result<api::ExecutionResult>> first_;
+    std::optional<Result<Answer>> first_;
     std::atomic<bool> ended_{false};
   };
-  struct Motion {
-    std::shared_ptr<Progress> progress;  // shared by the motion's thread and the waiting call
+  struct Run {
+    std::shared_ptr<Progress> progress;  // shared by the work's thread and the waiting call
     std::jthread thread;
   };
 
-  void Run(const api::ExecuteRequest& request, Progress& progress, std::stop_token stop) {
+  void Do(const Work& work, Progress& progress, std::stop_token stop) {
     std::stop_source ends;
     const std::stop_callback on_end(std::move(stop), [&] { ends.request_stop(); });
     const std::stop_callback on_shutdown(shared_.shutdown().get_token(),
                                          [&] { ends.request_stop(); });
-    progress.End(executor_.Execute(
-        request, [&](const api::ExecutionFeedback& now) { progress.Feed(now); }, ends.get_token()));
+    progress.End(work([&](Answer answer) { progress.Tell(std::move(answer)); }, ends.get_token()));
   }
 
   ServerShared& shared_;
-  api::ExecutorApi& executor_;
   std::mutex mutex_;
-  std::vector<Motion> motions_;
+  std::vector<Run> runs_;
 };
 
 class ExecutorService final : public v1::ExecutorService::Service {
  public:
   ExecutorService(ServerShared& shared, api::ExecutorApi& executor)
-      : shared_(shared), executor_(executor), detached_(shared, executor) {}
+      : shared_(shared), executor_(executor), motions_(shared), teleoperations_(shared) {}
 
   grpc::Status Plan(grpc::ServerContext* context, const v1::PlanRequest* request,
                     v1::PlanResponse* response) override {
     return Serve(shared_, *context, "exemplar.v1.ExecutorService/Plan", [&]() -> Status {
-      const Result<api::ExecuteRequest> execution = FromProto(request->execution(), "execution");
+      Result<api::ExecuteRequest> execution = FromProto(request->execution(), "execution");
       if (!execution) return execution.error();
+      execution->client = WhoCalls(*context);
       const Result<api::PlanSummary> plan = executor_.Plan(*execution);
       if (!plan) return plan.error();
       ToProto(*plan, response->mutable_plan());
@@ -98,10 +94,11 @@ class ExecutorService final : public v1::ExecutorService::Service {
 
   grpc::Status Execute(grpc::ServerContext* context, const v1::ExecuteRequest* request,
                        grpc::ServerWriter<v1::ExecuteResponse>* writer) override {
-    return Serve(shared_, *context, "exemplar.v1.ExecutorService/Execute", [&]() -> Status {
-      const Result<api::ExecuteRequest> execution = FromProto(request->execution(), "execution");
+    return Serve(shared_, *context, "exemplar.v1.ExecutorService/Execute", request->execution().skill().name(), [&]() -> Status {
+      Result<api::ExecuteRequest> execution = FromProto(request->execution(), "execution");
       if (!execution) return execution.error();
-      if (request->detached()) return PutResult(detached_.Begin(*execution), writer);
+      execution->client = WhoCalls(*context);
+      if (request->detached()) return PutResult(BeginMotion(*execution), writer);
       CancellationWatch watch(shared_, *context);
       LatestWriter<v1::ExecuteResponse> feedback(*writer, watch);
       const Result<api::ExecutionResult> result = executor_.Execute(
@@ -164,11 +161,65 @@ class ExecutorService final : public v1::ExecutorService::Service {
     });
   }
 
+  grpc::Status Teleoperate(grpc::ServerContext* context, const v1::TeleoperateRequest* request,
+                           grpc::ServerWriter<v1::TeleoperateResponse>* writer) override {
+    return Serve(shared_, *context, "exemplar.v1.ExecutorService/Teleoperate", [&]() -> Status {
+      const api::TeleoperationRequest teleoperation = FromProto(*request);
+      if (request->detached()) return PutResult(BeginTeleoperation(teleoperation), writer);
+      CancellationWatch watch(shared_, *context);
+      LatestWriter<v1::TeleoperateResponse> feedback(*writer, watch);
+      const Result<api::TeleoperationResult> result = executor_.Teleoperate(
+          teleoperation,
+          [&](const api::TeleoperationFeedback& now) {
+            v1::TeleoperateResponse message;
+            ToProto(now, message.mutable_feedback());
+            feedback.Post(std::move(message));
+          },
+          watch.token());
+      feedback.Finish();
+      return PutResult(result, writer);
+    });
+  }
+  grpc::Status EndTeleoperation(grpc::ServerContext* context, const v1::EndTeleoperationRequest*,
+                                v1::EndTeleoperationResponse*) override {
+    return Serve(shared_, *context, "exemplar.v1.ExecutorService/EndTeleoperation",
+                 [&] { return executor_.EndTeleoperation(); });
+  }
+
  private:
-  static Status PutResult(const Result<api::ExecutionResult>& result,
-                          grpc::ServerWriter<v1::ExecuteResponse>* writer) {
+  Result<api::ExecutionResult> BeginMotion(const api::ExecuteRequest& request) {
+    return motions_.Begin([this, request](const auto& tell, std::stop_token stop) {
+      return executor_.Execute(
+          request,
+          [&tell](const api::ExecutionFeedback& now) {
+            if (now.state != "executing") return;
+            api::ExecutionResult moving;
+            moving.state = now.state;
+            moving.plan.duration_s = now.duration_s;
+            tell(std::move(moving));
+          },
+          std::move(stop));
+    });
+  }
+
+  Result<api::TeleoperationResult> BeginTeleoperation(const api::TeleoperationRequest& request) {
+    return teleoperations_.Begin([this, request](const auto& tell, std::stop_token stop) {
+      return executor_.Teleoperate(
+          request,
+          [&tell](const api::TeleoperationFeedback& now) {
+            api::TeleoperationResult on;
+            on.state = now.state;
+            on.detail = now.detail;
+            tell(std::move(on));
+          },
+          std::move(stop));
+    });
+  }
+
+  template <class Answer, class Response>
+  static Status PutResult(const Result<Answer>& result, grpc::ServerWriter<Response>* writer) {
     if (!result) return result.error();
-    v1::ExecuteResponse last;
+    Response last;
     ToProto(*result, last.mutable_result());
     writer->Write(last);
     return {};
@@ -176,7 +227,8 @@ class ExecutorService final : public v1::ExecutorService::Service {
 
   ServerShared& shared_;
   api::ExecutorApi& executor_;
-  DetachedMotions detached_;
+  DetachedRuns<api::ExecutionResult> motions_;
+  DetachedRuns<api::TeleoperationResult> teleoperations_;
 };
 
 }  // namespace

@@ -120,6 +120,11 @@ struct ExecuteRequest {
   /// Where the motion is to begin; the robot goes there first. Absent: where the tool is now.
   std::optional<geometry::Pose> start;
   double speed = 1.0;  ///< 0 < speed <= 1
+  /// The skill's target moves, and is followed as it is seen on ircp/objects.
+  bool follow = false;
+  /// Who asks: named to others while the robot is this execution's. Over the network: the call's
+  /// request id.
+  std::string client = {};
   /// For callers over the network: Execute returns once the robot moves (the result's state says
   /// so), and the end of the call does not end the motion. Implementations need not look at it.
   bool detached = false;
@@ -178,6 +183,46 @@ struct RobotStatus {
   std::vector<SeenObject> objects;
 };
 
+struct TeleoperationRequest {
+  std::string suit;                ///< source of ircp/suit; empty: the first that is heard
+  std::vector<std::string> touch;  ///< objects of the scene that the touch links may touch
+  /// As ExecuteRequest's: Teleoperate returns once the mode is on, and the end of the call does not
+  /// end the mode.
+  bool detached = false;
+};
+
+struct TeleoperationFeedback {
+  std::string state;   ///< "teleoperating", ...
+  std::string phase;   ///< "holding", "approaching", "following", "blocked"
+  std::string detail;  ///< why it holds, what is in the way
+  double time_s = 0;
+  double behind_rad = 0;          ///< largest: the operator's posture against the commanded one
+  std::string behind_joint;       ///< which joint that is
+  double tracking_error_rad = 0;  ///< largest: commanded against measured
+  double touch_n = 0;
+  std::optional<double> clearance_m;  ///< of the last measured state
+  double suit_rate_hz = 0;
+};
+
+struct TeleoperationResult {
+  std::string state;  ///< "done", "aborted", "protective_stop", ...
+  std::string detail;
+  double duration_s = 0;
+  double following_s = 0;  ///< the approach aside
+  std::uint64_t suit_samples = 0;
+  std::uint64_t suit_samples_left_out = 0;  ///< malformed, late, of another suit
+  std::uint64_t commands_sent = 0;
+  std::uint64_t holds = 0;
+  std::uint64_t blocks = 0;
+  double tracking_error_rad = 0;      ///< largest
+  std::optional<double> clearance_m;  ///< smallest of the measured states
+  double touch_max_n = 0;
+  /// From the reception of a suit sample until its command was handed over for writing.
+  double latency_p50_s = 0;
+  double latency_p99_s = 0;
+  double latency_max_s = 0;
+};
+
 /// Implementations are thread-safe.
 class ExecutorApi {
  public:
@@ -194,6 +239,19 @@ class ExecutorApi {
   virtual Status Stop() = 0;
   virtual Status Reset() = 0;
   virtual Status SetSpeed(double factor) = 0;
+  /// The robot follows ircp/suit while the dead-man on ircp/safety is held. Returns when the mode
+  /// has ended and the robot rests. Feedback comes about ten times a second.
+  virtual Result<TeleoperationResult> Teleoperate(
+      const TeleoperationRequest& request,
+      const std::function<void(const TeleoperationFeedback&)>& feedback, std::stop_token stop) {
+    static_cast<void>(request);
+    static_cast<void>(feedback);
+    static_cast<void>(stop);
+    return FailedPrecondition("this executor cannot be teleoperated");
+  }
+  virtual Status EndTeleoperation() {
+    return FailedPrecondition("this executor cannot be teleoperated");
+  }
 };
 
 // ---------------------------------------------------------------- recorder
