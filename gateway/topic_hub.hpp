@@ -12,7 +12,6 @@
 
 #include "exemplar/api/topics.hpp"
 #include "exemplar/base/clock.hpp"
-#include "exemplar/base/log.hpp"
 #include "exemplar/ircp/bus.hpp"
 #include "exemplar/ircp/raw_writer.hpp"
 
@@ -32,7 +31,7 @@ struct SubscriptionOptions {
   /// First the last sample of each writer whose topic is transient local.
   bool last = true;
   /// Called when there is something to take and was nothing before, on a thread of the network or
-  /// within Subscribe: must be quick and must not call the hub. Null: nobody.
+  /// within Subscribe: must be quick, and call neither the hub nor the subscription. Null: nobody.
   std::function<void()> on_ready = {};
 };
 
@@ -51,9 +50,12 @@ class Subscription {
 };
 
 struct TopicHubOptions {
-  /// Topics that may be published on, as patterns; none: none. ircp/joint_command and the programs'
-  /// command and status topics never.
+  /// Topics that may be published on, as patterns; none: none. ircp/joint_command, ircp/clock and
+  /// the programs' command and status topics never.
   std::vector<std::string> publish = {};
+  /// Topics whose types are known though nobody may write them yet.
+  std::vector<ircp::RawTopic> known = {};
+  std::string source = "gateway";  ///< of published samples that name none
   /// More are refused.
   std::size_t max_subscriptions = 256;
   /// Writers that the gateway opens to publish, at most.
@@ -65,8 +67,7 @@ class TopicHub {
  public:
   /// Reads all topics of the station from now on. All arguments outlive the hub.
   static Result<std::unique_ptr<TopicHub>> Create(ircp::RawBus& bus, ircp::RawOutlet& outlet,
-                                                  const Clock& clock, Log& log,
-                                                  TopicHubOptions options);
+                                                  const Clock& clock, TopicHubOptions options);
   virtual ~TopicHub() = default;
 
   /// Those that were discovered since the start, by name.
