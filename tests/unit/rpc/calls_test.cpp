@@ -1,10 +1,7 @@
-// Servers and clients on loopback, port 0. The services behind them are scripted here: what they do
-// is not under test, only what happens on the way to them and back.
+// Servers and clients on loopback, port 0: every call directly, and through a gateway.
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <condition_variable>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -14,204 +11,10 @@
 #include "exemplar/rpc/client.hpp"
 #include "exemplar/rpc/server.hpp"
 #include "random_values.hpp"
+#include "scripted_services.hpp"
 
 namespace exemplar::rpc {
 namespace {
-
-using std::chrono::seconds;
-
-/// Opens once; whoever waits goes on.
-class Gate {
- public:
-  void Open() {
-    const std::lock_guard lock(mutex_);
-    open_ = true;
-    opened_.notify_all();
-  }
-  bool Wait() {
-    std::unique_lock lock(mutex_);
-    return opened_.wait_for(lock, seconds(20), [this] { return open_; });
-  }
-  /// False: `stop` came instead.
-  bool Wait(const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    return opened_.wait(lock, stop, [this] { return open_; });
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable_any opened_;
-  bool open_ = false;
-};
-
-/// Keeps files in memory; fails with `failure` where it is set.
-class ScriptedTrials final : public api::TrialApi {
- public:
-  Result<api::SubmitResult> Submit(const std::string& skill, const std::string& name,
-                                   std::string file) override {
-    if (failure) return *failure;
-    last_file = std::move(file);
-    api::SubmitResult result;
-    result.info.skill = skill;
-    result.info.source = name;
-    result.duplicate = true;
-    return result;
-  }
-  Result<std::vector<api::TrialInfo>> List(const std::string& skill) override {
-    if (failure) return *failure;
-    Rng rng(1);
-    std::vector<api::TrialInfo> list = {RandomTrialInfo(rng), RandomTrialInfo(rng)};
-    list[1].skill = skill;
-    return list;
-  }
-  Result<api::TrialInfo> Get(const std::string& id) override {
-    if (id == "throw") throw std::runtime_error("thrown on purpose");
-    if (failure) return *failure;
-    api::TrialInfo info;
-    info.id = id;
-    return info;
-  }
-  Result<demonstration::Trial> Load(const std::string&) override {
-    Rng rng(2);
-    return RandomTrial(rng);
-  }
-  Result<api::TrialSegments> Segments(const std::string& id,
-                                      const std::map<std::string, std::string>& options) override {
-    api::TrialSegments segments;
-    segments.id = id + ":" + options.at("rule");
-    return segments;
-  }
-  Result<api::TrialSegments> SegmentsOfFile(const std::string& name, std::string file,
-                                            const std::map<std::string, std::string>&) override {
-    last_file = std::move(file);
-    api::TrialSegments segments;
-    segments.id = name;
-    return segments;
-  }
-  Result<std::string> ExportCsv(const std::string&) override { return last_file; }
-  Status Delete(const std::string&) override {
-    if (failure) return *failure;
-    return {};
-  }
-
-  std::optional<Error> failure;
-  std::string last_file;
-};
-
-/// Learns until it is told to stop.
-class ScriptedSkills final : public api::SkillApi {
- public:
-  Result<learning::SkillReport> Learn(const std::string& name,
-                                      const std::map<std::string, std::string>& options,
-                                      const learning::Progress& progress,
-                                      std::stop_token stop) override {
-    progress(0.5, "half");
-    if (name == "endless") {
-      learning_began.Open();
-      never_.Wait(stop);
-      learning_stopped.Open();
-      return Error{ErrorCode::kCancelled, "learning was cancelled"};
-    }
-    learning::SkillReport report;
-    report.skill = name;
-    report.options = options;
-    return report;
-  }
-  Result<std::vector<api::SkillInfo>> List() override { return std::vector<api::SkillInfo>(2); }
-  Result<learning::SkillReport> Show(const std::string& name, int version) override {
-    learning::SkillReport report;
-    report.skill = name;
-    report.version = version;
-    return report;
-  }
-  Result<std::vector<api::VersionInfo>> Versions(const std::string&) override {
-    return std::vector<api::VersionInfo>(3);
-  }
-  Status Rollback(const std::string&, int version) override {
-    rolled_back_to = version;
-    return {};
-  }
-  Status Delete(const std::string&) override { return {}; }
-  Result<demonstration::SkillMotion> Query(const std::string& name, int version,
-                                           const demonstration::SkillQuery& query) override {
-    if (query.objects.empty()) return NotFound("no object is given", "objects");
-    demonstration::SkillMotion motion;
-    motion.skill = name;
-    motion.version = version;
-    motion.time_s = {0};
-    motion.joints.resize(1, 0);
-    motion.objectivity.resize(1, 0);
-    motion.objects = query.objects;
-    return motion;
-  }
-  Result<learning::Evaluation> Evaluate(const std::string&, int, const std::string&,
-                                        std::string file) override {
-    learning::Evaluation evaluation;
-    evaluation.answer.joints.resize(0, 0);
-    evaluation.deviation.frechet_m = static_cast<double>(file.size());
-    return evaluation;
-  }
-  Result<learning::Suggestions> Suggest(const std::string& name, int version,
-                                        const learning::SuggestOptions& options) override {
-    learning::Suggestions suggestions;
-    for (int k = 0; k < options.count; ++k) {
-      suggestions.places.push_back({.target = {name, geometry::Pose::Identity(), true},
-                                    .sigma_m = 0.01 * version,
-                                    .nearest_trial_m = 0.2,
-                                    .reason = "a gap"});
-    }
-    suggestions.typical_sigma_m = 0.004;
-    suggestions.notes = {"never turned"};
-    return suggestions;
-  }
-  Result<std::string> ExportJson(const std::string&, int) override { return std::string("{}"); }
-
-  Gate learning_began, learning_stopped;
-  std::atomic<int> rolled_back_to = 0;
-
- private:
-  Gate never_;
-};
-
-/// Moves until `finish` opens or it is told to stop.
-class ScriptedExecutor final : public api::ExecutorApi {
- public:
-  Result<api::PlanSummary> Plan(const api::ExecuteRequest&) override {
-    return FailedPrecondition("at 1.2 s forearm and table meet, 3 mm deep");
-  }
-  Result<api::ExecutionResult> Execute(
-      const api::ExecuteRequest&,
-      const std::function<void(const api::ExecutionFeedback&)>& feedback,
-      std::stop_token stop) override {
-    feedback({.state = "planning"});
-    feedback({.state = "executing", .time_s = 1, .duration_s = 4});
-    const bool finished = finish.Wait(stop);
-    ended.Open();
-    api::ExecutionResult result;
-    result.state = finished ? "done" : "aborted";
-    return result;
-  }
-  Result<api::RobotStatus> GetStatus() override {
-    api::RobotStatus status;
-    status.state = "idle";
-    return status;
-  }
-  Status Pause() override { return Note("pause"); }
-  Status Resume() override { return Note("resume"); }
-  Status Cancel() override { return Note("cancel"); }
-  Status Stop() override { return Note("stop"); }
-  Status Reset() override { return Note("reset"); }
-  Status SetSpeed(double factor) override { return Note("speed " + std::to_string(factor)); }
-
-  Gate finish, ended;
-  std::vector<std::string> notes;
-
- private:
-  Status Note(std::string note) {
-    notes.push_back(std::move(note));
-    return {};
-  }
-};
 
 api::ExecuteRequest Press() {
   api::ExecuteRequest request;
@@ -219,13 +22,27 @@ api::ExecuteRequest Press() {
   return request;
 }
 
-class CallsTest : public testing::Test {
+/// The parameter: whether a gateway stands between.
+class CallsTest : public testing::TestWithParam<bool> {
  protected:
   void Start(ServerOptions options = {}) {
+    ServerOptions behind = options;
+    if (GetParam()) behind.on_call = {};
     auto created =
-        Server::Create(options, {.trials = &trials_, .skills = &skills_, .executor = &executor_});
+        Server::Create(behind, {.trials = &trials_, .skills = &skills_, .executor = &executor_});
     ASSERT_TRUE(created.ok()) << created.error().message;
     server_ = *std::move(created);
+    if (GetParam()) {
+      backend_ = std::move(server_);
+      auto gateway = Server::Create(
+          options,
+          {.backends = {{.name = "backend",
+                         .connection = {.server = backend_->address()},
+                         .services = {"exemplar.v1.TrialService", "exemplar.v1.SkillService",
+                                      "exemplar.v1.ExecutorService"}}}});
+      ASSERT_TRUE(gateway.ok()) << gateway.error().message;
+      server_ = *std::move(gateway);
+    }
     Connect({.server = server_->address()});
   }
   void Connect(const ClientOptions& options) {
@@ -237,11 +54,12 @@ class CallsTest : public testing::Test {
   ScriptedTrials trials_;
   ScriptedSkills skills_;
   ScriptedExecutor executor_;
-  std::unique_ptr<Server> server_;
+  std::unique_ptr<Server> backend_;  ///< behind a gateway
+  std::unique_ptr<Server> server_;   ///< that is called
   Clients clients_;
 };
 
-TEST_F(CallsTest, EveryErrorKeepsCodeMessageAndField) {
+TEST_P(CallsTest, EveryErrorKeepsCodeMessageAndField) {
   Start();
   for (const ErrorCode code :
        {ErrorCode::kInvalidArgument, ErrorCode::kNotFound, ErrorCode::kAlreadyExists,
@@ -257,7 +75,7 @@ TEST_F(CallsTest, EveryErrorKeepsCodeMessageAndField) {
   }
 }
 
-TEST_F(CallsTest, ALongErrorArrivesCut) {
+TEST_P(CallsTest, ALongErrorArrivesCut) {
   Start();
   trials_.failure = InvalidArgument(std::string(100'000, 'x'), std::string(10'000, 'f'));
   const auto got = clients_.trials->Get("x");
@@ -267,7 +85,7 @@ TEST_F(CallsTest, ALongErrorArrivesCut) {
   EXPECT_GT(got.error().message.size(), 1000u);
 }
 
-TEST_F(CallsTest, AnExceptionBecomesAnInternalErrorAndTheServerLives) {
+TEST_P(CallsTest, AnExceptionBecomesAnInternalErrorAndTheServerLives) {
   Start();
   const auto got = clients_.trials->Get("throw");
   ASSERT_FALSE(got.ok());
@@ -276,7 +94,7 @@ TEST_F(CallsTest, AnExceptionBecomesAnInternalErrorAndTheServerLives) {
   EXPECT_TRUE(clients_.trials->Get("x").ok());
 }
 
-TEST_F(CallsTest, FilesOfManyChunksArriveWhole) {
+TEST_P(CallsTest, FilesOfManyChunksArriveWhole) {
   Start();
   Rng rng(7);
   for (const std::size_t size : {0, 1, 262'144, 262'145, 5'000'000}) {
@@ -297,7 +115,7 @@ TEST_F(CallsTest, FilesOfManyChunksArriveWhole) {
   }
 }
 
-TEST_F(CallsTest, AFileOverTheLimitIsRefused) {
+TEST_P(CallsTest, AFileOverTheLimitIsRefused) {
   ServerOptions options;
   options.max_file_bytes = 1'000'000;
   Start(options);
@@ -307,7 +125,7 @@ TEST_F(CallsTest, AFileOverTheLimitIsRefused) {
   EXPECT_TRUE(clients_.trials->Submit("press", "small.csv", "x").ok());
 }
 
-TEST_F(CallsTest, TrialsArriveWithTheirSamples) {
+TEST_P(CallsTest, TrialsArriveWithTheirSamples) {
   Start();
   Rng rng(2);
   const auto loaded = clients_.trials->Load("x");
@@ -319,14 +137,14 @@ TEST_F(CallsTest, TrialsArriveWithTheirSamples) {
   EXPECT_EQ((*list)[1].skill, "press");
 }
 
-TEST_F(CallsTest, SegmentsAreAskedOfATrialOrOfAFile) {
+TEST_P(CallsTest, SegmentsAreAskedOfATrialOrOfAFile) {
   Start();
   EXPECT_EQ(clients_.trials->Segments("trial-1", {{"rule", "literal"}})->id, "trial-1:literal");
   EXPECT_EQ(clients_.trials->SegmentsOfFile("a.csv", "bytes", {})->id, "a.csv");
   EXPECT_EQ(trials_.last_file, "bytes");
 }
 
-TEST_F(CallsTest, LearningStreamsProgressAndEndsWithTheReport) {
+TEST_P(CallsTest, LearningStreamsProgressAndEndsWithTheReport) {
   Start();
   const auto report = clients_.skills->Learn("press", {{"method", "paper"}},
                                              [](double fraction, std::string_view step) {
@@ -339,7 +157,7 @@ TEST_F(CallsTest, LearningStreamsProgressAndEndsWithTheReport) {
   EXPECT_EQ(report->options.at("method"), "paper");
 }
 
-TEST_F(CallsTest, AStopOnTheClientsSideStopsTheServersWork) {
+TEST_P(CallsTest, AStopOnTheClientsSideStopsTheServersWork) {
   Start();
   std::stop_source stop;
   const auto report = clients_.skills->Learn(
@@ -349,7 +167,7 @@ TEST_F(CallsTest, AStopOnTheClientsSideStopsTheServersWork) {
   EXPECT_TRUE(skills_.learning_stopped.Wait());
 }
 
-TEST_F(CallsTest, RunningOutOfTimeStopsTheServersWork) {
+TEST_P(CallsTest, RunningOutOfTimeStopsTheServersWork) {
   Start();
   Connect({.server = server_->address(), .long_timeout = std::chrono::milliseconds(50)});
   const auto report = clients_.skills->Learn("endless", {}, {}, {});
@@ -358,7 +176,7 @@ TEST_F(CallsTest, RunningOutOfTimeStopsTheServersWork) {
   EXPECT_TRUE(skills_.learning_stopped.Wait());
 }
 
-TEST_F(CallsTest, ShutdownStopsCallsThatRun) {
+TEST_P(CallsTest, ShutdownStopsCallsThatRun) {
   Start();
   std::jthread shutdown([&] {
     EXPECT_TRUE(skills_.learning_began.Wait());
@@ -370,7 +188,7 @@ TEST_F(CallsTest, ShutdownStopsCallsThatRun) {
   EXPECT_TRUE(skills_.learning_stopped.Wait());
 }
 
-TEST_F(CallsTest, QueriesNameTheFieldOfTheRequest) {
+TEST_P(CallsTest, QueriesNameTheFieldOfTheRequest) {
   Start();
   const auto motion = clients_.skills->Query("press", 2, {});
   ASSERT_FALSE(motion.ok());
@@ -378,7 +196,7 @@ TEST_F(CallsTest, QueriesNameTheFieldOfTheRequest) {
   EXPECT_EQ(motion.error().field, "query.objects");
 }
 
-TEST_F(CallsTest, AStreamAnswersQuestionAfterQuestionAndOutlivesBadOnes) {
+TEST_P(CallsTest, AStreamAnswersQuestionAfterQuestionAndOutlivesBadOnes) {
   Start();
   const auto stream = OpenMotionStream({.server = server_->address()}, "press", 2);
   ASSERT_TRUE(stream.ok());
@@ -398,14 +216,14 @@ TEST_F(CallsTest, AStreamAnswersQuestionAfterQuestionAndOutlivesBadOnes) {
   }
 }
 
-TEST_F(CallsTest, AStreamToNobodySaysSo) {
+TEST_P(CallsTest, AStreamToNobodySaysSo) {
   const auto stream = OpenMotionStream({.server = "127.0.0.1:1"}, "press", 0);
   ASSERT_TRUE(stream.ok());
   EXPECT_EQ((*stream)->Ask({}).error().code, ErrorCode::kUnavailable);
   EXPECT_EQ((*stream)->Ask({}).error().code, ErrorCode::kUnavailable);
 }
 
-TEST_F(CallsTest, SkillCallsArriveWithTheirArguments) {
+TEST_P(CallsTest, SkillCallsArriveWithTheirArguments) {
   Start();
   EXPECT_EQ(clients_.skills->Show("press", 3)->version, 3);
   EXPECT_EQ(clients_.skills->List()->size(), 2u);
@@ -425,7 +243,7 @@ TEST_F(CallsTest, SkillCallsArriveWithTheirArguments) {
   EXPECT_EQ(*clients_.skills->ExportJson("press", 1), "{}");
 }
 
-TEST_F(CallsTest, ExecutionStreamsFeedbackAndEndsWithTheResult) {
+TEST_P(CallsTest, ExecutionStreamsFeedbackAndEndsWithTheResult) {
   Start();
   std::string last_state;
   const auto result = clients_.executor->Execute(Press(),
@@ -440,7 +258,7 @@ TEST_F(CallsTest, ExecutionStreamsFeedbackAndEndsWithTheResult) {
   EXPECT_EQ(last_state, "executing");
 }
 
-TEST_F(CallsTest, CancellingAnExecutionReachesTheRobot) {
+TEST_P(CallsTest, CancellingAnExecutionReachesTheRobot) {
   Start();
   std::stop_source stop;
   const auto result = clients_.executor->Execute(
@@ -449,7 +267,7 @@ TEST_F(CallsTest, CancellingAnExecutionReachesTheRobot) {
   EXPECT_TRUE(executor_.ended.Wait());
 }
 
-TEST_F(CallsTest, ADetachedMotionOutlivesItsCall) {
+TEST_P(CallsTest, ADetachedMotionOutlivesItsCall) {
   Start();
   api::ExecuteRequest request = Press();
   request.detached = true;
@@ -460,16 +278,17 @@ TEST_F(CallsTest, ADetachedMotionOutlivesItsCall) {
   EXPECT_TRUE(executor_.ended.Wait());
 }
 
-TEST_F(CallsTest, ShutdownEndsADetachedMotion) {
+TEST_P(CallsTest, ShutdownEndsADetachedMotion) {
   Start();
   api::ExecuteRequest request = Press();
   request.detached = true;
   ASSERT_TRUE(clients_.executor->Execute(request, {}, {}).ok());
   server_.reset();
+  backend_.reset();
   EXPECT_TRUE(executor_.ended.Wait());
 }
 
-TEST_F(CallsTest, RobotCommandsArrive) {
+TEST_P(CallsTest, RobotCommandsArrive) {
   Start();
   EXPECT_TRUE(clients_.executor->Pause().ok());
   EXPECT_TRUE(clients_.executor->Resume().ok());
@@ -485,7 +304,7 @@ TEST_F(CallsTest, RobotCommandsArrive) {
             "at 1.2 s forearm and table meet, 3 mm deep");
 }
 
-TEST_F(CallsTest, AServiceThatIsNotServedIsNamed) {
+TEST_P(CallsTest, AServiceThatIsNotServedIsNamed) {
   Start();
   const auto status = clients_.recorder->GetStatus();
   ASSERT_FALSE(status.ok());
@@ -493,7 +312,7 @@ TEST_F(CallsTest, AServiceThatIsNotServedIsNamed) {
   EXPECT_NE(status.error().message.find(server_->address()), std::string::npos);
 }
 
-TEST_F(CallsTest, NobodyAnsweringIsSaidWithTheAddress) {
+TEST_P(CallsTest, NobodyAnsweringIsSaidWithTheAddress) {
   Connect({.server = "127.0.0.1:1"});
   const auto list = clients_.trials->List("");
   ASSERT_FALSE(list.ok());
@@ -501,7 +320,7 @@ TEST_F(CallsTest, NobodyAnsweringIsSaidWithTheAddress) {
   EXPECT_NE(list.error().message.find("127.0.0.1:1"), std::string::npos);
 }
 
-TEST_F(CallsTest, CallsAreReportedWithTheirRequestId) {
+TEST_P(CallsTest, CallsAreReportedWithTheirRequestId) {
   std::mutex mutex;
   std::vector<std::string> records;
   ServerOptions options;
@@ -519,6 +338,10 @@ TEST_F(CallsTest, CallsAreReportedWithTheirRequestId) {
   EXPECT_EQ(records, (std::vector<std::string>{"exemplar.v1.TrialService/Get mine-1 ok",
                                                "exemplar.v1.TrialService/Get mine-2 not_found"}));
 }
+
+INSTANTIATE_TEST_SUITE_P(AllWays, CallsTest, testing::Bool(), [](const auto& info) {
+  return std::string(info.param ? "ThroughAGateway" : "Directly");
+});
 
 TEST(CallLogTest, SumsCallsByMethodAndOutcome) {
   NullLog log;

@@ -37,7 +37,9 @@ class FileDescriptor {
   int fd_;
 };
 
-std::string Serialize(const std::vector<Metric>& metrics) {
+}  // namespace
+
+std::string MetricsText(const std::vector<Metric>& metrics) {
   std::vector<prometheus::MetricFamily> families;
   for (const Metric& metric : metrics) {
     prometheus::MetricFamily family;
@@ -58,6 +60,8 @@ std::string Serialize(const std::vector<Metric>& metrics) {
   }
   return prometheus::TextSerializer().Serialize(families);
 }
+
+namespace {
 
 bool ReadHead(int fd, std::string& head) {
   char buffer[1024];
@@ -101,7 +105,7 @@ class SocketMetricsServer final : public MetricsServer {
     std::string status = "200 OK";
     std::string body;
     if (head.starts_with("GET /metrics ")) {
-      body = Serialize(metrics_);
+      body = MetricsText(metrics_);
     } else if (head.starts_with("GET /healthz ")) {
       body = "ok\n";
     } else {

@@ -41,6 +41,9 @@ class Signals {
 
 using exemplar::Metric;
 
+/// All figures as they are now, in Prometheus' text format.
+std::string MetricsText(const std::vector<Metric>& metrics);
+
 /// Serves GET /metrics and /healthz on HOST:PORT until destroyed. Thread-safe.
 class MetricsServer {
  public:

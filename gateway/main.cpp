@@ -1,0 +1,83 @@
+// exemplar-gateway: one address for every service of the system, and the station's topics for
+// clients that do not speak DDS.
+
+#include "exemplar/bus/participant.hpp"
+#include "exemplar/program/options.hpp"
+#include "exemplar/program/runtime.hpp"
+#include "exemplar/rpc/call_log.hpp"
+#include "exemplar/rpc/server.hpp"
+#include "gateway/control.hpp"
+#include "gateway/http_side.hpp"
+#include "gateway/known_topics.hpp"
+#include "gateway/metrics.hpp"
+#include "gateway/program_options.hpp"
+#include "gateway/topic_hub.hpp"
+#include "gateway/topic_server.hpp"
+
+int main(int argc, char** argv) {
+  using namespace exemplar;
+  constexpr const char* kName = "exemplar-gateway";
+  program::Options options(
+      kName, "One address for every service of the system, and the station's topics",
+      "exemplar-gateway --station lab --listen 127.0.0.1:50050 --learning 127.0.0.1:50051 "
+      "--executor 127.0.0.1:50052 --recorder 127.0.0.1:50053 --http 127.0.0.1:8080",
+      {.bus = true, .server = true, .client = true});
+  gateway::ProgramOptions words;
+  words.AddTo(options);
+  if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
+  const program::CommonOptions& common = options.common();
+
+  program::Signals signals;
+  const std::unique_ptr<Log> log = program::MakeLog(common, "gateway");
+  const SystemClock clock;
+  auto participant = bus::Participant::Create({.domain = common.domain,
+                                               .station = common.station,
+                                               .name = kName,
+                                               .interfaces = common.interfaces,
+                                               .peers = common.peers,
+                                               .discovery_servers = common.discovery_servers,
+                                               .best_effort_topics = common.best_effort,
+                                               .security = common.security,
+                                               .clock = &clock,
+                                               .log = log.get()});
+  if (!participant) return program::Fail(kName, participant.error());
+
+  auto hub = gateway::TopicHub::Create(**participant, **participant, clock,
+                                       {.publish = words.publish, .known = gateway::KnownTopics()});
+  if (!hub) return program::Fail(kName, hub.error());
+  gateway::TopicServer topics(**hub, {.queue = words.queue});
+  rpc::CallLog calls(*log);
+  auto server = rpc::Server::Create(
+      {.listen = common.listen,
+       .port_file = common.port_file,
+       .credentials = common.server,
+       .log = log.get(),
+       .on_call = [&calls](const rpc::CallRecord& call) { calls.Record(call); }},
+      {.topics = &topics, .backends = words.Backends(common)});
+  if (!server) return program::Fail(kName, server.error());
+  auto control = gateway::OpenControl(**participant, clock, **hub);
+  if (!control) return program::Fail(kName, control.error());
+  (*control)->SetState("ready", (*server)->address());
+
+  std::vector<Metric> figures = rpc::MetricsOf(calls, "exemplar_gateway");
+  for (const auto& more : {gateway::MetricsOf(**hub), gateway::MetricsOf(**server)}) {
+    figures.insert(figures.end(), more.begin(), more.end());
+  }
+  std::unique_ptr<gateway::HttpSide> http;
+  if (!words.http.empty()) {
+    auto made = gateway::HttpSide::Create(words, common, **server, *log);
+    if (!made) return program::Fail(kName, made.error());
+    http = std::move(*made);
+    for (Metric& metric : http::MetricsOf(http->server())) figures.push_back(std::move(metric));
+    if (const Status started = http->Start(figures); !started) {
+      return program::Fail(kName, started.error());
+    }
+  }
+  const auto metrics = program::ServeMetrics(common, std::move(figures));
+  if (!metrics) return program::Fail(kName, metrics.error());
+  log->Info("ready", {{"address", (*server)->address()}, {"station", common.station}});
+  signals.Wait();
+  if (http) http->Stop();
+  (*server)->Shutdown(std::chrono::seconds(1));
+  return 0;
+}
