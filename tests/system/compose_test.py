@@ -75,16 +75,16 @@ class ComposeTest(unittest.TestCase):
     @classmethod
     def teach(cls):
         begin = time.monotonic()
-        cls.station.compose("up", "-d", EXEMPLAR_FOLLOW="suit")
+        cls.station.compose("up", "-d", *LONG_RUNNING, EXEMPLAR_FOLLOW="suit")
         wait_for(lambda: cls.station.healthy(*LONG_RUNNING), "healthy containers", 90)
         tell(f"up and healthy: {time.monotonic() - begin:.0f} s")
         cls.station.compose("run", "--rm", "capture-suit", "--places", ";".join(PLACES), "--record", "--name", "trial", timeout=240)
         files = [f"/trials/trial-{number:03}.mcap" for number in range(1, len(PLACES) + 1)]
         # With the image of the command line, as on a machine that has nothing else.
-        submitted = json.loads(cls.station.compose("run", "--rm", "exemplar", "trial", "submit", "--skill", "press", *files, "--format", "json"))
+        submitted = json.loads(cls.station.compose("run", "--rm", "exemplar", "--server", "learning:50051", "trial", "submit", "--skill", "press", *files, "--format", "json"))
         assert len(submitted) == len(PLACES), submitted
         cls.cli("learning", "skill", "learn", "press")
-        cls.station.compose("up", "-d")  # the simulator now follows commands
+        cls.station.compose("up", "-d", *LONG_RUNNING)  # the simulator now follows commands
         wait_for(lambda: cls.station.healthy(*LONG_RUNNING), "healthy containers", 90)
         cls.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
         tell(f"taught by {len(PLACES)} trials: {time.monotonic() - begin:.0f} s")
@@ -173,7 +173,7 @@ class ComposeTest(unittest.TestCase):
         self.before = self.acknowledged()
 
     def tearDown(self):
-        if any(error for _, error in getattr(self._outcome, "errors", [])):
+        if not self._outcome.success:
             self.show_logs()
         with contextlib.suppress(AssertionError):
             self.recorder("stop")
@@ -318,7 +318,7 @@ class ComposeTest(unittest.TestCase):
         self.assertEqual(set(codes.values()), {0}, codes)
         self.station.compose("down")
         begin = time.monotonic()
-        self.station.compose("up", "-d")
+        self.station.compose("up", "-d", *LONG_RUNNING)
         wait_for(lambda: self.station.healthy(*LONG_RUNNING), "healthy containers", 90)
         self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
         self.works_again("down and up", begin)
@@ -330,7 +330,8 @@ class ComposeTest(unittest.TestCase):
             begin = time.monotonic()
             self.station.compose("--profile", "discovery", "up", "-d", "discovery")
             wait_for(lambda: self.station.healthy("discovery"), "the discovery server", 30)
-            self.station.compose("up", "-d", **server)
+            self.station.compose("up", "-d", *LONG_RUNNING, **server)
+            wait_for(lambda: self.station.healthy(*LONG_RUNNING), "healthy containers", 90)
             # Nobody meets by multicast any more.
             for service in LONG_RUNNING:
                 self.station.within(service, "iptables", "-A", "OUTPUT", "-d", "224.0.0.0/4", "-j", "DROP")
@@ -343,7 +344,7 @@ class ComposeTest(unittest.TestCase):
             self.works_again("simulator killed beside the new discovery server", begin)
         finally:
             self.station.compose("--profile", "discovery", "rm", "--stop", "--force", "discovery")
-            self.station.compose("up", "-d")
+            self.station.compose("up", "-d", *LONG_RUNNING)
             self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
         self.works_again("with multicast again", time.monotonic())
 

@@ -131,6 +131,15 @@ class UsageTest(unittest.TestCase):
                 self.assertIn("slip.yaml: line 2", done.stderr)
                 self.assertIn("did you mean log-level", done.stderr)
 
+    def test_the_options_of_containers_and_packages_are_known(self):
+        files = [*(ROOT / "deploy" / "docker" / "etc").glob("*.yaml"), *(ROOT / "deploy" / "systemd" / "etc").glob("*.yaml")]
+        self.assertGreater(len(files), 10)
+        for file in files:
+            with self.subTest(str(file)):
+                done = run(file.stem, "--config", file, "--check")
+                # Nobody runs there: that is found out once the options are understood.
+                self.assertEqual(done.returncode, 5, done.stderr)
+
     def test_what_is_missing_is_named(self):
         absent = self.folder / "absent"
         port = ["--listen", "127.0.0.1:0"]
@@ -378,6 +387,27 @@ class InMotionTest(unittest.TestCase):
         lines = executor.lines()
         stop = next(n for n, line in enumerate(lines) if "protective_stop" in line and "shutting down" in line)
         self.assertLess(stop, next(n for n, line in enumerate(lines) if "stopped" in line and n > stop), lines)
+
+    def test_a_motion_outlives_its_learning_service(self):
+        executor = self.moving_executor()
+        learning = self.learning
+        learning.end(signal.SIGKILL)
+        done = 'exemplar_executor_executions_total{end="done"}'
+        self.assertTrue(wait_for(lambda: executor.metrics().get(done) == 1, 20), executor.lines())
+        refused = self.ask(executor, "skill", "execute", "press", "--object", "target=0.55,-0.15,0.05", "--wait")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("does not answer", refused.stderr)
+        executor.end()
+        type(self).learning = self.start("learning", "--data-dir", self.folder / "learning")
+
+    def test_nobody_who_joins_can_hold_up_what_the_robot_says_or_is_told(self):
+        # Fast DDS opens a newcomer's port of shared memory by a check that may sleep .33 s: those two have none.
+        executor = self.moving_executor()
+        for program in (executor, self.simulator):
+            maps = pathlib.Path(f"/proc/{program.process.pid}/maps").read_text()
+            self.assertIn("libfastrtps", maps)
+            self.assertNotIn("fastrtps_port", maps)
+        self.assertEqual(executor.end()[0], 0)
 
     def test_the_robot_holds_by_itself_when_its_executor_is_killed(self):
         executor = self.moving_executor()

@@ -40,6 +40,14 @@ class RecorderTest(unittest.TestCase):
     def messages(self, server):
         return exemplar("record", "status", "--server", server)["messages"]
 
+    def test_a_container_that_shares_no_memory_is_heard_where_its_own_is_tiny(self):
+        # On the host's network it looks like any other program of the machine, but /dev/shm is its own.
+        own = ("unshare", "--mount", "sh", "-c", 'mount -t tmpfs -o size=8m none /dev/shm && exec "$@"', "sh")
+        _, server = self.programs.recorder("--expect", TOPIC, prefix=own)
+        self.assertEqual(self.replay("--record", "--name", "t", "--rate", "2").wait(60), 0, self.programs.logs())
+        topics = {topic["topic"]: topic for topic in exemplar("record", "status", "--server", server)["topics"]}
+        self.assertEqual((topics[TOPIC]["received"], topics[TOPIC]["lost"]), (self.samples, 0))
+
     def test_a_killed_recorder_loses_no_more_than_the_flush_interval(self):
         rng = random.Random(4)
         for number in range(3):

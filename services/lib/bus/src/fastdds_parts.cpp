@@ -79,11 +79,14 @@ Result<std::vector<std::string>> ResolveInterfaces(const std::vector<std::string
 }
 
 /// No more than a sixteenth of what /dev/shm has left: containers give it 64 MB, and a program that
-/// finds it full later would die of it.
+/// finds it full later would die of it. None where that would hold no picture, so that a container
+/// with a tiny /dev/shm talks UDP only.
 std::uint32_t SharedMemoryBytes(std::size_t wanted) {
+  constexpr std::size_t kUsefulBytes = std::size_t{1} << 20;
   struct statvfs space {};
   if (wanted == 0 || statvfs("/dev/shm", &space) != 0) return 0;
   const std::size_t free_bytes = std::size_t{space.f_bavail} * space.f_frsize;
+  if (free_bytes / 16 < kUsefulBytes) return 0;
   return static_cast<std::uint32_t>(std::min(wanted, free_bytes / 16));
 }
 
