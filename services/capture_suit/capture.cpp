@@ -20,6 +20,9 @@ Status CheckUsage(const CaptureOptions& options) {
     return InvalidArgument("give --replay FILE... or --person, one of them");
   }
   if (!options.person) return {};
+  if (options.dead_man && !options.carrying.to.empty()) {
+    return InvalidArgument("--carry-to goes without --dead-man: it is the simulator that follows");
+  }
   if (options.robot_folder.empty()) return InvalidArgument("--person needs --robot", "robot");
   if (options.scene_file.empty()) return InvalidArgument("--person needs --scene", "scene");
   return {};
@@ -32,8 +35,19 @@ Result<std::unique_ptr<Session>> MakeSession(ircp::Bus& bus, const Clock& clock,
     if (!robot) return robot.error();
     const auto scene = scene::ReadDescription(options.scene_file);
     if (!scene) return scene.error();
+    if (!options.carrying.to.empty()) {
+      CarrySessionOptions carrying = options.carrying;
+      carrying.object = options.performing.object;
+      carrying.places = options.performing.places;
+      carrying.person = options.performing.person;
+      carrying.person.seed = static_cast<std::uint64_t>(options.seed);
+      carrying.record = options.record;
+      carrying.name = options.name;
+      return AsSession(CarrySession::Create(bus, clock, log, *robot, *scene, carrying));
+    }
     PersonSessionOptions performing = options.performing;
     performing.record = options.record;
+    performing.dead_man = options.dead_man;
     performing.name = options.name;
     performing.person.seed = static_cast<std::uint64_t>(options.seed);
     return AsSession(PersonSession::Create(bus, clock, log, *robot, *scene, performing));
@@ -46,6 +60,7 @@ Result<std::unique_ptr<Session>> MakeSession(ircp::Bus& bus, const Clock& clock,
   }
   ReplayOptions replaying = options.replaying;
   replaying.record = options.record;
+  replaying.dead_man = options.dead_man;
   replaying.name = options.name;
   return AsSession(ReplaySession::Create(bus, clock, log, std::move(trials), replaying));
 }

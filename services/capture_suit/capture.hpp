@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "capture_suit/carry_session.hpp"
 #include "capture_suit/person_session.hpp"
 #include "capture_suit/replay_session.hpp"
 #include "exemplar/base/metric.hpp"
@@ -20,9 +21,11 @@ struct CaptureOptions {
   std::string robot_folder;  ///< the person's body
   std::string scene_file;    ///< what stands around it
   PersonSessionOptions performing;
-  std::string name = "trial";  ///< of the recordings
-  int seed = 1;                ///< of the person's chance
-  bool record = false;         ///< have the recorder record every trial
+  CarrySessionOptions carrying;  ///< of a person who carries, where `to` is named
+  std::string name = "trial";    ///< of the recordings
+  int seed = 1;                  ///< of the person's chance
+  bool dead_man = false;         ///< hold the dead-man on ircp/safety while a trial goes on
+  bool record = false;           ///< have the recorder record every trial
 };
 
 /// Says what is missing or too much.

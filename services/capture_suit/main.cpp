@@ -30,6 +30,10 @@ int main(int argc, char** argv) {
               "x,y[,z[,qx,qy,qz,qw]];... of the button, base frame, m; where the scene has it when "
               "not given");
   options.Add("--object", person.object, "the button to press; the scene's first when not given");
+  options.Add("--carry-to", what.carrying.to,
+              "take --object with the hand and lay it down on this object, instead of pressing");
+  options.Add("--to-places", what.carrying.to_places,
+              "of that object, as --places; as many, or one");
   options.Add("--place-only", person.place_only, "put the button there and press nothing");
   options
       .Add("--press-depth", person.press_depth_m,
@@ -37,6 +41,9 @@ int main(int argc, char** argv) {
       .MinMax(0, 0.05);
   options.Add("--tempo", person.person.tempo, "of the person; 2: twice as fast").MinMax(0.2, 5);
   options.Add("--seed", what.seed, "of the person's chance").MinMax(0, 2e9);
+  options.Add("--dead-man", what.dead_man,
+              "hold the dead-man on ircp/safety while a trial goes on, for a robot that is "
+              "teleoperated; a trial begins once the robot follows");
   options.Add("--record", what.record, "have the recorder record every trial");
   options.Add("--name", what.name, "of the recordings; several are numbered NAME-001");
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;

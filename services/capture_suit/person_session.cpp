@@ -85,6 +85,11 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
     if (!recorder) return recorder.error();
     session->recorder_ = std::move(*recorder);
   }
+  if (options.dead_man) {
+    Result<std::unique_ptr<DeadMan>> dead_man = DeadMan::Create(bus, clock);
+    if (!dead_man) return dead_man.error();
+    session->dead_man_ = std::move(*dead_man);
+  }
   auto control = ircp::ControlServer::Create(
       bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
         return {false, "\"" + command.action + "\" is no action of this program", {}};
@@ -148,6 +153,7 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
 
   const std::string trial =
       "trial " + std::to_string(index + 1) + " of " + std::to_string(places_.size());
+  if (Status status = BeFollowed(stop); !status) return status;
   control_->SetState("moving", "to the start of " + trial);
   if (Status status =
           MoveTo(joints.values.row(0).transpose(), std::max(kWayToStart, options_.settle_s), stop);
@@ -156,8 +162,9 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
   }
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, places_.size());
-    if (Status status = recorder_->Start(name, performed->trial.source, stop); !status)
-      return status;
+    const Status started =
+        WhileStill([&] { return recorder_->Start(name, performed->trial.source, stop); }, stop);
+    if (!started) return started;
   }
   control_->SetState("performing", trial);
   const Duration start = clock_.Steady();
@@ -168,6 +175,16 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
     } else {
       sent = Send(joints.values.row(static_cast<Eigen::Index>(k)).transpose());
     }
+  }
+  if (dead_man_) {
+    const Status still = WhileStill(
+        [&]() -> Status {
+          clock_.SleepFor(kHeldAfter, stop);
+          dead_man_->Release();
+          return {};
+        },
+        stop);
+    if (sent) sent = still;
   }
   if (sent && !WaitForAcknowledgments(stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", index + 1}});
@@ -182,6 +199,41 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
               FormatFixed(performed->trial.duration_s(), 1) + " s");
   }
   return sent;
+}
+
+Status PersonSession::WhileStill(const std::function<Status()>& work, const std::stop_token& stop) {
+  if (!dead_man_) return work();
+  Status sent;
+  Status done;
+  {
+    std::stop_source over;
+    const std::jthread still([&] {
+      while (sent && !stop.stop_requested() &&
+             clock_.SleepFor(FromSeconds(1 / options_.person.rate_hz), over.get_token())) {
+        sent = Send(posture_);
+      }
+    });
+    done = work();
+    over.request_stop();
+  }
+  return done ? sent : done;
+}
+
+Status PersonSession::BeFollowed(const std::stop_token& stop) {
+  if (!dead_man_) return {};
+  return WhileStill(
+      [&]() -> Status {
+        dead_man_->Release();
+        if (!clock_.SleepFor(kReleasedFor, stop)) return Cancelled();
+        dead_man_->Press();
+        const Duration deadline = clock_.Steady() + kFollowTimeout;
+        while (!dead_man_->followed() && clock_.Steady() < deadline) {
+          if (!clock_.SleepFor(kPollInterval, stop)) return Cancelled();
+        }
+        if (!dead_man_->followed()) log_.Warning("no robot follows the suit");
+        return {};
+      },
+      stop);
 }
 
 Status PersonSession::MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop) {
@@ -231,7 +283,9 @@ bool PersonSession::WaitForAcknowledgments(const std::stop_token& stop) {
 
 std::vector<ircp::TopicCount> PersonSession::sent() const {
   if (suit_ == nullptr) return {};
-  return {{ircp::SuitSample::kTopic, kSource, suit_->sent()}};
+  std::vector<ircp::TopicCount> counts = {{ircp::SuitSample::kTopic, kSource, suit_->sent()}};
+  if (dead_man_) counts.push_back(dead_man_->sent());
+  return counts;
 }
 
 }  // namespace exemplar::capture_suit

@@ -2,12 +2,14 @@
 // A simulated person in the suit, in real time.
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
+#include "capture_suit/dead_man.hpp"
 #include "capture_suit/recorder_remote.hpp"
 #include "capture_suit/session.hpp"
 #include "exemplar/base/clock.hpp"
@@ -24,6 +26,7 @@ struct PersonSessionOptions {
   std::string object = {};              ///< the button to press; empty: the scene's first
   std::string places = {};              ///< as ParsePlaces reads them; empty: where the button is
   std::string name = {};                ///< of the recordings
+  bool dead_man = false;                ///< hold it, and begin when the robot follows
   bool record = false;                  ///< tell the recorder
   bool place_only = false;              ///< put the button at each place and press nothing
   double press_depth_m = 0;             ///< 0: the button's travel and a little more
@@ -53,6 +56,10 @@ class PersonSession final : public Session {
   Status Perform(std::size_t index, std::stop_token stop);
   /// Sends a smooth way from where the suit is to `goal`.
   Status MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop);
+  /// Sends the last posture again and again meanwhile, as a suit does whose wearer stands still.
+  Status WhileStill(const std::function<Status()>& work, const std::stop_token& stop);
+  /// Presses the dead-man and waits for the robot, where there is one to wait for.
+  Status BeFollowed(const std::stop_token& stop);
   Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture);
   void WaitForReaders(std::stop_token stop);
   bool WaitForAcknowledgments(const std::stop_token& stop);
@@ -68,6 +75,7 @@ class PersonSession final : public Session {
   std::unique_ptr<ircp::Writer<ircp::SuitSample>> suit_;
   std::unique_ptr<ircp::ControlClient> simulator_;
   std::optional<RecorderRemote> recorder_;
+  std::unique_ptr<DeadMan> dead_man_;             ///< null: nobody holds one
   std::unique_ptr<ircp::ControlServer> control_;  ///< destroyed first: it asks suit_ for its count
 };
 

@@ -55,13 +55,18 @@ Result<std::unique_ptr<ReplaySession>> ReplaySession::Create(
     if (!recorder) return recorder.error();
     session->recorder_ = std::move(*recorder);
   }
+  if (options.dead_man) {
+    Result<std::unique_ptr<DeadMan>> dead_man = DeadMan::Create(bus, clock);
+    if (!dead_man) return dead_man.error();
+    session->dead_man_ = std::move(*dead_man);
+  }
   auto control = ircp::ControlServer::Create(
       bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
         return {false, "\"" + command.action + "\" is no action of this program", {}};
       });
   if (!control) return control.error();
   session->control_ = std::move(*control);
-  const TrialStreams* counted = &session->streams_;
+  const ReplaySession* counted = session.get();
   session->control_->SetSentCounts([counted] { return counted->sent(); });
   return session;
 }
@@ -80,6 +85,7 @@ Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
   const std::string place =
       "trial " + std::to_string(index + 1) + " of " + std::to_string(trials_.size());
   for (const std::string& notice : trial.notices) log_.Warning(notice);
+  if (Status status = BeFollowed(trial, stop); !status) return status;
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, trials_.size());
     if (Status status = recorder_->Start(name, trial.source, stop); !status) return status;
@@ -87,6 +93,7 @@ Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
   control_->SetState("playing", trial.source);
   const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);
   Status played = streams_.Play(samples, options_.rate, clock_, stop);
+  if (dead_man_) dead_man_->Release();
   if (played && !streams_.WaitForAcknowledgments(kAcknowledgeTimeout, clock_, stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", trial.source}});
   }
@@ -100,6 +107,44 @@ Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
     log_.Info(place + ": " + trial.source + ", " + FormatFixed(trial.duration_s(), 1) + " s");
   }
   return played;
+}
+
+Status ReplaySession::BeFollowed(const demonstration::Trial& trial, const std::stop_token& stop) {
+  if (!dead_man_) return {};
+  const ircp::TrialSamples samples = ircp::SamplesOf(trial, Stamp{}, options_.frame);
+  const ircp::SuitSample* first = nullptr;
+  for (const ircp::TrialSample& sample : samples.samples) {
+    first = std::get_if<ircp::SuitSample>(&sample);
+    if (first != nullptr) break;
+  }
+  if (first == nullptr) {
+    log_.Warning("the trial has no joints of a suit that a robot could follow");
+    return {};
+  }
+  dead_man_->Release();
+  const Duration press = clock_.Steady() + kReleasedFor;
+  const Duration deadline = press + kFollowTimeout;
+  bool pressed = false;
+  while (!dead_man_->followed() && clock_.Steady() < deadline) {
+    if (!pressed && clock_.Steady() >= press) {
+      dead_man_->Press();
+      pressed = true;
+    }
+    ircp::SuitSample still = *first;
+    still.header.stamp = clock_.Now();
+    if (Status sent = streams_.Send(still); !sent) return sent;
+    if (!clock_.SleepFor(kPollInterval, stop)) {
+      return Error{ErrorCode::kCancelled, "stopped before the trial had begun"};
+    }
+  }
+  if (!dead_man_->followed()) log_.Warning("no robot follows the suit");
+  return {};
+}
+
+std::vector<ircp::TopicCount> ReplaySession::sent() const {
+  std::vector<ircp::TopicCount> counts = streams_.sent();
+  if (dead_man_) counts.push_back(dead_man_->sent());
+  return counts;
 }
 
 void ReplaySession::WaitForReaders(std::stop_token stop) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "capture_suit/dead_man.hpp"
 #include "capture_suit/recorder_remote.hpp"
 #include "capture_suit/session.hpp"
 #include "capture_suit/trial_streams.hpp"
@@ -21,6 +22,7 @@ namespace exemplar::capture_suit {
 
 struct ReplayOptions {
   double rate = 1;             ///< so many times faster than recorded
+  bool dead_man = false;       ///< hold it, and begin when the robot follows
   bool record = false;         ///< tell the recorder to start and stop around each trial
   std::string name = {};       ///< of the recordings
   std::string frame = "base";  ///< the frame of the files' poses
@@ -40,13 +42,15 @@ class ReplaySession final : public Session {
   /// Plays every trial once somebody reads (or after some seconds, with a warning), and ends when
   /// the readers have acknowledged. kCancelled soon after `stop`; a recording is stopped first.
   Status Run(std::stop_token stop) override;
-  std::vector<ircp::TopicCount> sent() const override { return streams_.sent(); }
+  std::vector<ircp::TopicCount> sent() const override;
   std::uint64_t trials_ended() const override { return trials_ended_; }
 
  private:
   ReplaySession(const Clock& clock, Log& log, std::vector<demonstration::Trial> trials,
                 TrialStreams streams, const ReplayOptions& options);
   void WaitForReaders(std::stop_token stop);
+  /// Presses the dead-man while the suit stands still as the trial begins, until a robot follows.
+  Status BeFollowed(const demonstration::Trial& trial, const std::stop_token& stop);
   Status PlayOne(std::size_t index, std::stop_token stop);
 
   const Clock& clock_;
@@ -56,6 +60,7 @@ class ReplaySession final : public Session {
   ReplayOptions options_;
   std::atomic<std::uint64_t> trials_ended_{0};
   std::optional<RecorderRemote> recorder_;
+  std::unique_ptr<DeadMan> dead_man_;             ///< null: nobody holds one
   std::unique_ptr<ircp::ControlServer> control_;  ///< destroyed first: it asks streams_ for counts
 };
 

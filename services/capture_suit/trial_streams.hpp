@@ -25,6 +25,11 @@ class TrialStreams {
   Status Play(const ircp::TrialSamples& trial, double rate, const Clock& clock,
               std::stop_token stop);
 
+  /// Precondition: a trial had suit samples.
+  Status Send(const ircp::SuitSample& sample) {
+    return std::get<WriterPtr<ircp::SuitSample>>(writers_)->Write(sample);
+  }
+
   /// Topics that nobody reads.
   std::vector<std::string> UnreadTopics() const;
   std::vector<ircp::TopicCount> sent() const;

@@ -1,0 +1,41 @@
+#pragma once
+// The dead-man switch of whoever wears the suit, on ircp/safety, and what comes of it.
+
+#include <atomic>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "exemplar/base/clock.hpp"
+#include "exemplar/ircp/bus.hpp"
+
+namespace exemplar::capture_suit {
+
+/// Says 20 times a second whether the switch is held; it is released at first, and when this goes.
+/// Thread-safe.
+class DeadMan {
+ public:
+  static Result<std::unique_ptr<DeadMan>> Create(ircp::Bus& bus, const Clock& clock);
+  ~DeadMan();
+
+  void Press() { Set(true); }
+  void Release() { Set(false); }
+  /// Whether the executor says that the robot follows.
+  bool followed() const { return followed_.load(); }
+  ircp::TopicCount sent() const;
+
+ private:
+  DeadMan(const Clock& clock, std::unique_ptr<ircp::Writer<ircp::SafetySample>> writer);
+  void Set(bool held);
+  void Run(const std::stop_token& stop);
+
+  const Clock& clock_;
+  std::unique_ptr<ircp::Writer<ircp::SafetySample>> writer_;
+  std::atomic<bool> held_{false};
+  std::atomic<bool> followed_{false};
+  std::unique_ptr<ircp::Reader> executor_;
+  std::jthread thread_;
+};
+
+}  // namespace exemplar::capture_suit
