@@ -102,6 +102,8 @@ void AddRobotCommands(Command& root, const Session& session) {
     });
   }
 
+  AddTeleopCommands(robot, session);
+
   struct SpeedWords {
     std::string factor, format;
   };
