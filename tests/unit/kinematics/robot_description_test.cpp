@@ -96,5 +96,38 @@ TEST(FullJointVector, DerivesMimicJointsAndRestsTheOthers) {
   EXPECT_EQ(full[model.FindJoint("other")], 0);
 }
 
+TEST(Hand, IsReadFromTheModelsFolder) {
+  const Result<RobotDescription> robot =
+      ReadRobotDescription(EXEMPLAR_SOURCE_DIR "/deploy/models/arm7_hand");
+  ASSERT_TRUE(robot.ok()) << robot.error().message;
+  ASSERT_TRUE(robot->model.hand.has_value());
+  const Hand& hand = *robot->model.hand;
+  const int left = robot->model.FindJoint("left_finger");
+  const int right = robot->model.FindJoint("right_finger");
+  EXPECT_EQ(hand.joint, left);
+  EXPECT_EQ(robot->model.joints[left].limits.effort, 30);
+  EXPECT_EQ(robot->hand_servo.stiffness, 3000);
+  EXPECT_DOUBLE_EQ(hand.OpeningAt(hand.PositionAt(0.3)), 0.3);
+  Eigen::VectorXd full = FullJointVector(robot->model, robot->chain, robot->home);
+  EXPECT_EQ(full[left], 0.04) << "open";
+  EXPECT_EQ(full[right], 0.04);
+  SetHandOpening(robot->model, 0.25, full);
+  EXPECT_DOUBLE_EQ(full[left], 0.01);
+  EXPECT_DOUBLE_EQ(full[right], 0.01) << "it follows";
+  SetHandOpening(robot->model, 7, full);
+  EXPECT_DOUBLE_EQ(full[left], 0.04);
+}
+
+TEST_F(RobotFolder, RefusesHandsThatCannotOpen) {
+  const std::string good = "urdf: two.urdf\nbase: ground\ntip: tool\nhome: {first: 0, second: 0}\n";
+  EXPECT_THAT(ErrorOf(good + "hand: {joint: frist, closed: 0, open: 1}\n"),
+              AllOf(HasSubstr("robot.yaml:5"), HasSubstr("first")));
+  EXPECT_THAT(ErrorOf(good + "hand: {joint: first, closed: 0, open: 1}\n"),
+              HasSubstr("not belong to the chain"));
+  EXPECT_THAT(ErrorOf(good + "hand: {closed: 0, open: 1}\n"), HasSubstr("hand.joint"));
+  EXPECT_THAT(ErrorOf(good + "hand: [first]\n"), HasSubstr("hand must hold"));
+  EXPECT_THAT(ErrorOf(good + "hand: {joint: first, shut: 0}\n"), HasSubstr("unknown key"));
+}
+
 }  // namespace
 }  // namespace exemplar::kinematics

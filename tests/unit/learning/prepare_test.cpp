@@ -296,5 +296,30 @@ TEST(StaticPose, TellsAPushFromATremble) {
   EXPECT_TRUE(StaticPose(box, 0.5).has_value());
 }
 
+TEST(TakenFrom, IsWhereAThingStoodBeforeTheHandTookIt) {
+  Rng rng(8);
+  demonstration::PoseSeries box;
+  for (int k = 0; k < 100; ++k) {
+    const double t = k / 10.0;
+    box.time_s.push_back(t);
+    geometry::Pose pose = geometry::Pose::FromTranslation({0.3 * MinimumJerk((t - 3) / 3), 0.2, 0});
+    for (double& x : pose.translation) x += rng.Normal(0, 5e-4);
+    box.base_T_frame.push_back(pose);
+  }
+  ASSERT_FALSE(StaticPose(box, 0.5).has_value());
+  const std::optional<geometry::Pose> taken = TakenFrom(box, 0.5);
+  ASSERT_TRUE(taken.has_value());
+  EXPECT_LT((taken->translation - Eigen::Vector3d(0, 0.2, 0)).norm(), 1e-3);
+  // What moves from the beginning, or still at the end, is not taken: it moves by itself.
+  for (std::size_t k = 0; k < box.size(); ++k) {
+    box.base_T_frame[k].translation.x() = 0.05 * box.time_s[k];
+  }
+  EXPECT_FALSE(TakenFrom(box, 0.5).has_value());
+  demonstration::PoseSeries brief;
+  brief.time_s = {0, 0.1};
+  brief.base_T_frame.resize(2);
+  EXPECT_FALSE(TakenFrom(brief, 0.5).has_value());
+}
+
 }  // namespace
 }  // namespace exemplar::learning

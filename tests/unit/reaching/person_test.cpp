@@ -243,5 +243,57 @@ TEST(Person, RefusesOptionsThatMakeNoSense) {
   EXPECT_EQ(person.Press(std::span<const Target>()).error().field, "targets");
 }
 
+TEST(Person, CarriesThingsFromOnePlaceToAnother) {
+  Result<kinematics::RobotDescription> body =
+      kinematics::ReadRobotDescription(EXEMPLAR_SOURCE_DIR "/deploy/models/arm7_hand");
+  ASSERT_TRUE(body.ok()) << body.error().message;
+  Result<Person> person =
+      Person::Create(*body, {.seed = 3, .noise_scale = 0, .variation_scale = 0});
+  ASSERT_TRUE(person.ok());
+  Target from{"block", {{0.45, -0.2, 0.025}, geometry::ExpSo3({0, 0, 0.3})}};
+  Target to{"tray", geometry::Pose::FromTranslation({0.5, 0.2, 0.01})};
+  to.object_p_contact = {0, 0, 0.03};
+  const Result<Demonstration> done = person->Carry(from, to);
+  ASSERT_TRUE(done.ok()) << done.error().message;
+  const demonstration::ScalarSeries& joints = done->trial.joints;
+  const demonstration::ScalarSeries& hands = done->trial.hands;
+  ASSERT_EQ(hands.size(), joints.size());
+  const auto tool_at = [&](double t) {
+    const auto k =
+        std::upper_bound(joints.time_s.begin(), joints.time_s.end(), t) - joints.time_s.begin() - 1;
+    return body->chain.ToolPose(joints.values.row(k).transpose());
+  };
+  for (const auto& [target, t] :
+       {std::pair(from, done->carry.grasp_s + 0.3), std::pair(to, done->carry.release_s + 0.3)}) {
+    const geometry::Pose tool = tool_at(t);
+    const Eigen::Vector3d asked = target.base_T_object * target.object_p_contact;
+    EXPECT_LT((tool.translation - asked).norm(), 1e-3) << target.name;
+    EXPECT_LT((tool.rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(), 1e-3);
+    // The fingers, to both sides along the tool's x, close along the object's x or y.
+    const Eigen::Vector3d fingers =
+        target.base_T_object.rotation.conjugate() * (tool.rotation * Eigen::Vector3d::UnitX());
+    EXPECT_GT(std::max(std::abs(fingers.x()), std::abs(fingers.y())), 0.999) << target.name;
+  }
+  EXPECT_EQ(hands.values(0, 0), 1);
+  EXPECT_EQ(hands.values.minCoeff(), 0);
+  EXPECT_EQ(hands.values(hands.values.rows() - 1, 0), 1);
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    const double t = joints.time_s[k];
+    if (t < done->carry.grasp_s + 1.2 || t > done->carry.release_s - 1.2) continue;
+    EXPECT_GT(tool_at(t).translation.z(), 0.06) << "it is carried in the air, " << t << " s";
+  }
+}
+
+TEST(Person, SaysWhichEndOfACarryIsOutOfReach) {
+  Person person = MakePerson({.seed = 12});
+  Target near{"block", geometry::Pose::FromTranslation({0.45, -0.2, 0.05})};
+  Target far{"tray", geometry::Pose::FromTranslation({2, 0, 0})};
+  const Result<Demonstration> done = person.Carry(near, far);
+  ASSERT_FALSE(done.ok());
+  EXPECT_EQ(done.error().code, ErrorCode::kFailedPrecondition);
+  near.base_T_object.translation.x() = std::nan("");
+  EXPECT_EQ(person.Carry(near, far).error().code, ErrorCode::kInvalidArgument);
+}
+
 }  // namespace
 }  // namespace exemplar::reaching

@@ -225,5 +225,40 @@ TEST(Description, AMissingFileIsNotFound) {
   EXPECT_THAT(read.error().message, HasSubstr("/nowhere/scene.yaml"));
 }
 
+TEST(Description, ReadsObjects) {
+  const Result<Description> read = ParseDescription(
+      "objects:\n"
+      "  - {name: block, shape: box, size: [0.04, 0.05, 0.06], position: [0.5, 0, 0.03],\n"
+      "     mass: 0.3, friction: 0.5, marker: {id: 3, size: 0.03, position: [0, 0, 0.03]}}\n"
+      "  - {name: tray, shape: cylinder, radius: 0.1, length: 0.004, position: [0.5, 0.2, 0.002],\n"
+      "     fixed: true}\n",
+      "scene.yaml");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->objects.size(), 2u);
+  EXPECT_EQ(read->objects[0].mass_kg, 0.3);
+  EXPECT_EQ(read->objects[0].friction, 0.5);
+  EXPECT_FALSE(read->objects[0].fixed);
+  EXPECT_TRUE(read->objects[1].fixed);
+  const std::vector<Marked> marked = MarkedThings(*read);
+  ASSERT_EQ(marked.size(), 1u);
+  EXPECT_EQ(marked[0].name, "block");
+}
+
+TEST(Description, RefusesObjectsThatCannotBe) {
+  const std::string object =
+      "objects:\n  - {name: block, shape: box, size: [1, 1, 1], position: [0, 0, 0], ";
+  EXPECT_THAT(ErrorOf(object + "mass: 0}"), AllOf(HasSubstr("scene.yaml:2"), HasSubstr("mass")));
+  EXPECT_THAT(ErrorOf(object + "friction: -1}"), HasSubstr("friction"));
+  EXPECT_THAT(ErrorOf(object + "fixed: true, mass: 1}"), HasSubstr("fixed object"));
+  EXPECT_THAT(ErrorOf(object + "weight: 1}"), HasSubstr("unknown key"));
+  EXPECT_THAT(
+      ErrorOf("objects:\n  - {name: bowl, shape: mesh, mesh: bowl.stl, position: [0, 0, 0]}"),
+      HasSubstr("only a fixed object may be a mesh"));
+  EXPECT_THAT(
+      ErrorOf("obstacles:\n  - {name: block, shape: sphere, radius: 1, position: [0, 0, 0]}\n" +
+              object + "mass: 1}"),
+      HasSubstr("taken already"));
+}
+
 }  // namespace
 }  // namespace exemplar::scene

@@ -365,4 +365,15 @@ double CollisionChecker::CapsuleSelfClearance(const Eigen::Ref<const Eigen::Vect
   return smallest;
 }
 
+Eigen::VectorXd CollisionChecker::LongestLevers() const {
+  Eigen::VectorXd levers =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(impl_->model.joints.size()));
+  for (const Pair& pair : impl_->pairs) {
+    for (const Lever& lever : pair.levers) {
+      levers[lever.joint] = std::max(levers[lever.joint], lever.length);
+    }
+  }
+  return levers;
+}
+
 }  // namespace exemplar::collision

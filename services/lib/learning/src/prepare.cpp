@@ -354,6 +354,12 @@ Result<UniformTrial> Prepare(const demonstration::Trial& trial, const LearnOptio
       out.base_T_object.emplace_back(frames, *base_T_object);
       continue;
     }
+    if (const std::optional<geometry::Pose> base_T_object =
+            trial.hands.empty() ? std::nullopt : TakenFrom(object, extent_m)) {
+      out.notes.push_back(stream + ": the hand takes it; where it stood before counts");
+      out.base_T_object.emplace_back(frames, *base_T_object);
+      continue;
+    }
     SmoothedPoses poses = SmoothPoses(object, *base, 0);
     out.notes.push_back(stream + ": it moves");
     out.base_T_object.push_back(std::move(poses.poses));

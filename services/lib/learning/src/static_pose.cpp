@@ -84,4 +84,28 @@ std::optional<geometry::Pose> StaticPose(const demonstration::PoseSeries& series
   return pose;
 }
 
+std::optional<geometry::Pose> TakenFrom(const demonstration::PoseSeries& series, double extent_m) {
+  constexpr double kLeastStill_s = 0.5;
+  constexpr std::size_t kLeastSamples = 4;
+  const auto part = [&](std::size_t first, std::size_t last) {
+    demonstration::PoseSeries cut;
+    cut.has_orientation = series.has_orientation;
+    const auto begin = static_cast<std::ptrdiff_t>(first);
+    const auto end = static_cast<std::ptrdiff_t>(last);
+    cut.time_s.assign(series.time_s.begin() + begin, series.time_s.begin() + end);
+    cut.base_T_frame.assign(series.base_T_frame.begin() + begin, series.base_T_frame.begin() + end);
+    return cut;
+  };
+  const std::vector<double>& time = series.time_s;
+  std::size_t head = 0;
+  while (head < time.size() && time[head] < time.front() + kLeastStill_s) ++head;
+  std::size_t tail = time.size();
+  while (tail > 0 && time[tail - 1] > time.back() - kLeastStill_s) --tail;
+  if (head < kLeastSamples || time.size() - tail < kLeastSamples || head > tail) {
+    return std::nullopt;
+  }
+  if (!StaticPose(part(tail, time.size()), extent_m)) return std::nullopt;
+  return StaticPose(part(0, head), extent_m);
+}
+
 }  // namespace exemplar::learning

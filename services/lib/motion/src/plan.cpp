@@ -455,6 +455,7 @@ class Planner {
     const double offset = approach->trajectory.duration_s();
     plan.trajectory = Concatenate(approach->trajectory, skill);
     plan.report.approach_s = offset;
+    for (const double t : frame_time_s) plan.frame_time_s.push_back(offset + t);
     plan.report.time_stretch = skill.duration_s() / prepared_.path.time_s.back();
 
     if (approach->rise_s > 0) {

@@ -18,6 +18,10 @@ constexpr double kLift = 0.035;              // m
 constexpr double kPushTime = 0.75;           // s
 constexpr double kHoldTime = 0.35;           // s
 constexpr double kLiftTime = 0.45;           // s
+constexpr double kClearOfThings = 0.12;      // m, above what is taken or laid down
+constexpr double kLowerTime = 0.9;           // s
+constexpr double kPauseTime = 0.25;          // s
+constexpr double kGripTime = 0.5;            // s, from open to closed
 constexpr double kRestTime = 0.4;            // s, after the way back
 constexpr double kFirstShare = 0.96;         // of the distance, by the first submovement
 constexpr double kRise = 0.08;               // of the distance, above the straight line
@@ -120,6 +124,28 @@ class Hand {
     path_.presses.push_back(truth);
   }
 
+  /// Down to the target, there the hand goes to `open`, and up again. Returns when it began to.
+  double Handle(const HandTarget& target, double open) {
+    const double rise = kClearOfThings * Around(0.1);
+    Reach(target.base_p_contact + rise * target.base_normal, target.base_pointing, 2);
+    Advance(tip_.end_s() - Now() + Time(kPauseTime, 0.2));
+    const double lower_time = Time(kLowerTime, 0.15);
+    tip_.Add({Now(), lower_time, target.base_p_contact - Arrival() + Seeing(target.base_normal)});
+    Advance(lower_time + Time(kPauseTime, 0.2));
+    const double begin_s = Now();
+    goal_open_ = open;
+    Advance(kGripTime + Time(kPauseTime, 0.2));
+    const double lift_time = Time(kLowerTime, 0.15);
+    tip_.Add({Now(), lift_time, rise * target.base_normal});
+    Advance(0.8 * lift_time);
+    return begin_s;
+  }
+
+  void Carry(const HandTarget& from, const HandTarget& to) {
+    path_.carry.grasp_s = Handle(from, 0);
+    path_.carry.release_s = Handle(to, 1);
+  }
+
   void Retract() {
     const Vector3d off = options_.variation_scale * 0.008 * Normals();
     Reach(rest_ + off, rest_pointing_, 1);
@@ -194,6 +220,9 @@ class Hand {
       planned_before_ = planned;
       path_.base_p_tip.push_back(planned + drift_ + Tremor(t));
       path_.base_pointing.push_back(pointing_.At(t).normalized());
+      path_.open.push_back(open_);
+      const double most = step_s_ / kGripTime;
+      open_ += std::clamp(goal_open_ - open_, -most, most);
       ++steps_;
     }
   }
@@ -212,6 +241,8 @@ class Hand {
   Rng rng_;
   const Vector3d rest_, rest_pointing_;
   Course tip_, pointing_;
+  double open_ = 1;
+  double goal_open_ = 1;
   double tempo_ = 1;
   double tremor_hz_[2] = {};
   Vector3d tremor_phase_[2];
@@ -269,6 +300,14 @@ Result<HandPath> SimulateHand(const Vector3d& base_p_rest, const Vector3d& base_
         a + (at - static_cast<double>(before)) * (path.base_p_tip[before + 1] - a);
   }
   return path;
+}
+
+HandPath SimulateCarry(const Vector3d& base_p_rest, const HandTarget& from, const HandTarget& to,
+                       const PersonOptions& options, double step_s, Rng rng) {
+  Hand hand(base_p_rest, from.base_pointing, options, step_s, rng);
+  hand.Carry(from, to);
+  hand.Retract();
+  return std::move(hand).Take();
 }
 
 }  // namespace exemplar::reaching

@@ -22,7 +22,9 @@ struct HandPath {
   double step_s = 0;
   std::vector<Eigen::Vector3d> base_p_tip;     ///< one a step, the first at time 0
   std::vector<Eigen::Vector3d> base_pointing;  ///< unit
+  std::vector<double> open;                    ///< of the hand, 0 to 1
   std::vector<PressTruth> presses;
+  CarryTruth carry;
   double end_s = 0;
 };
 
@@ -31,5 +33,10 @@ Result<HandPath> SimulateHand(const Eigen::Vector3d& base_p_rest,
                               const Eigen::Vector3d& base_rest_pointing,
                               std::span<const HandTarget> targets, const PersonOptions& options,
                               double step_s, Rng rng);
+
+/// From rest to `from`, where the hand closes, over to `to`, where it opens, and back near rest. At
+/// both it comes down along the normal and goes up again.
+HandPath SimulateCarry(const Eigen::Vector3d& base_p_rest, const HandTarget& from,
+                       const HandTarget& to, const PersonOptions& options, double step_s, Rng rng);
 
 }  // namespace exemplar::reaching

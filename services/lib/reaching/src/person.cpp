@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -22,6 +23,7 @@ constexpr double kPostureDrift = 0.02;   // rad, of that posture within a trial
 constexpr double kSuitNoise = 3e-4;      // rad
 constexpr double kForceNoise = 0.03;     // N
 constexpr double kObjectNoise = 0.5e-3;  // m
+constexpr double kTurnedBefore = 0.9;    // s, before it takes or lays down, the hand is turned
 constexpr double kTrunkWeight = 4;       // what moving the trunk costs more than the wrist
 
 Status CheckOption(bool fine, const char* name, double value, const char* rule) {
@@ -58,6 +60,29 @@ HandTarget InBase(const Target& target, double tilt) {
   if (outward.norm() > 1e-6) outward.normalize();
   hand.base_pointing = (std::tan(tilt) * outward - hand.base_normal).normalized();
   return hand;
+}
+
+/// The hand from above, its fingers to both sides along the target's x or y, as little turned from
+/// `base_R_near` as can be.
+Eigen::Quaterniond Grip(const Target& target, const Eigen::Quaterniond& base_R_near) {
+  const Vector3d z = -(target.base_T_object.rotation * target.object_normal.normalized());
+  Eigen::Quaterniond best = base_R_near;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vector3d& axis :
+       {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(-1, 0, 0), Vector3d(0, -1, 0)}) {
+    Vector3d x = target.base_T_object.rotation * axis;
+    x = (x - x.dot(z) * z).normalized();
+    if (!x.allFinite()) continue;
+    Eigen::Matrix3d base_R_tool;
+    base_R_tool << x, z.cross(x), z;
+    const Eigen::Quaterniond grip(base_R_tool);
+    const double turn = grip.angularDistance(base_R_near);
+    if (turn < least) {
+      least = turn;
+      best = grip;
+    }
+  }
+  return best;
 }
 
 Vector3d PointingOf(const geometry::Pose& base_T_tool) {
@@ -221,6 +246,98 @@ Result<Demonstration> Person::Press(std::span<const Target> targets) {
       seen.base_T_frame.push_back(pose);
     }
     trial.objects.push_back(std::move(seen));
+  }
+  return result;
+}
+
+Result<Demonstration> Person::Carry(const Target& from, const Target& to) {
+  const Target* ends[] = {&from, &to};
+  for (const Target* target : ends) {
+    if (target->base_T_object.translation.allFinite() && target->object_p_contact.allFinite() &&
+        target->object_normal.norm() > 1e-9) {
+      continue;
+    }
+    return InvalidArgument("target \"" + target->name + "\" has no finite place or direction",
+                           "targets");
+  }
+  const Rng trial_rng = rng_.Fork(++trials_);
+  Rng rng = trial_rng.Fork(0);
+  const double variation = options_.variation_scale;
+  const Comfort comfort(chain_, rest_, variation, rng);
+  const geometry::Pose base_T_rest = chain_.ToolPose(rest_);
+  Vector3d start = base_T_rest.translation;
+  for (int i = 0; i < 3; ++i) start[i] += variation * rng.Normal(0, 0.008);
+  const HandTarget taken = InBase(from, 0);
+  const HandTarget laid = InBase(to, 0);
+  const Eigen::Quaterniond base_R_take = Grip(from, base_T_rest.rotation);
+  const Eigen::Quaterniond base_R_lay = Grip(to, base_R_take);
+
+  const int every = static_cast<int>(std::ceil(kFineRate / options_.rate_hz));
+  const double step_s = 1 / (options_.rate_hz * every);
+  const HandPath path = SimulateCarry(start, taken, laid, options_, step_s, trial_rng.Fork(1));
+
+  Demonstration result;
+  result.carry = path.carry;
+  result.end_s = path.end_s;
+  demonstration::Trial& trial = result.trial;
+  trial.source = "simulated person, seed " + std::to_string(options_.seed) + ", trial " +
+                 std::to_string(trials_);
+  const Eigen::Index samples =
+      static_cast<Eigen::Index>((path.base_p_tip.size() - 1) / static_cast<std::size_t>(every) + 1);
+  trial.joints.names = chain_.joint_names();
+  trial.joints.values.resize(samples, chain_.dof());
+  trial.hands.names = {""};
+  trial.hands.values.resize(samples, 1);
+  demonstration::PoseSeries tool;
+
+  kinematics::IkOptions ik;
+  ik.position_tolerance_m = 1e-7;
+  ik.rotation_tolerance_rad = 1e-7;
+  ik.preferred_weights = PostureWeights(chain_.dof());
+  ik.max_restarts = 0;  // another branch would be a jump
+  VectorXd q = rest_;
+  Rng sensors = trial_rng.Fork(2);
+  const auto turning = [](double t, double begin, double end) {
+    const double s = std::clamp((t - begin) / (end - begin), 0.0, 1.0);
+    return s * s * s * (10 - 15 * s + 6 * s * s);
+  };
+  for (Eigen::Index k = 0; k < samples; ++k) {
+    const double t = static_cast<double>(k) / options_.rate_hz;
+    const std::size_t fine = static_cast<std::size_t>(k) * static_cast<std::size_t>(every);
+    const CarryTruth& carry = path.carry;
+    const double down_s = kTurnedBefore;
+    Eigen::Quaterniond base_R_tool =
+        base_T_rest.rotation.slerp(turning(t, 0.3, carry.grasp_s - down_s), base_R_take);
+    base_R_tool =
+        base_R_tool.slerp(turning(t, carry.grasp_s + down_s, carry.release_s - down_s), base_R_lay);
+    base_R_tool =
+        base_R_tool.slerp(turning(t, carry.release_s + down_s, path.end_s), base_T_rest.rotation);
+    ik.preferred = comfort.At(t);
+    Result<kinematics::IkSolution> posture =
+        kinematics::SolveIk(chain_, {path.base_p_tip[fine], base_R_tool}, q, ik);
+    if (!posture) {
+      const bool first = t < carry.grasp_s + down_s;
+      return FailedPrecondition(
+          Place(first ? from : to) + " is out of comfortable reach: " + posture.error().message,
+          first ? "targets[0]" : "targets[1]");
+    }
+    q = posture->q;
+    trial.joints.time_s.push_back(t);
+    trial.hands.time_s.push_back(t);
+    trial.hands.values(k, 0) = path.open[fine];
+    for (int i = 0; i < chain_.dof(); ++i) {
+      const kinematics::JointLimits& limits = chain_.limits()[static_cast<std::size_t>(i)];
+      const double read = q[i] + options_.noise_scale * sensors.Normal(0, kSuitNoise);
+      trial.joints.values(k, i) = std::clamp(read, limits.lower, limits.upper);
+    }
+    if (options_.tool_poses) {
+      tool.time_s.push_back(t);
+      tool.base_T_frame.push_back(chain_.ToolPose(q));
+    }
+  }
+  if (options_.tool_poses) {
+    geometry::MakeSignsContinuous(tool.base_T_frame);
+    trial.end_effectors.push_back(std::move(tool));
   }
   return result;
 }

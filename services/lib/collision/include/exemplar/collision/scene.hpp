@@ -161,6 +161,11 @@ class CollisionChecker {
   bool KeepsClear(const JointPath& path, double begin, double end, double required_clearance_m,
                   const std::vector<AllowedTouch>& allowed = {}) const;
 
+  /// For each joint of the model a bound of the way (m) that any point of the robot makes against
+  /// any other body when that joint alone moves by 1 rad or m, wherever the robot stands. Ways of
+  /// several joints add up.
+  Eigen::VectorXd LongestLevers() const;
+
   struct Impl;  ///< opaque
 
  private:

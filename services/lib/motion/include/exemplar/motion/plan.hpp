@@ -91,7 +91,8 @@ struct PlannedMotion {
   JointTrajectory trajectory;
   std::vector<ContactWindow> contacts;
   std::vector<TouchWindow> touches;
-  PlanReport report;
+  std::vector<double> frame_time_s = {};  ///< when each frame of the skill's motion is reached
+  PlanReport report = {};
 };
 
 /// IK along the whole motion, collision checks at and between frames, timing within limits.

@@ -55,9 +55,16 @@ struct PressTruth {
   Eigen::Vector3d base_p_contact = Eigen::Vector3d::Zero();
 };
 
+/// When the hand took what it carried and let it go, in seconds since the trial's start.
+struct CarryTruth {
+  double grasp_s = 0;    ///< the hand begins to close
+  double release_s = 0;  ///< and to open again
+};
+
 struct Demonstration {
   demonstration::Trial trial;
   std::vector<PressTruth> presses;  ///< one a target, in order
+  CarryTruth carry = {};            ///< of Carry
   double end_s = 0;                 ///< the hand is back at rest
 };
 
@@ -76,6 +83,11 @@ class Person {
   Result<Demonstration> Press(const Target& target) { return Press(std::span(&target, 1)); }
   /// A target of the default name that faces up.
   Result<Demonstration> Press(const Eigen::Vector3d& base_p_button);
+
+  /// Takes `from` with the hand from above, its fingers along the object's x or y, lays it down at
+  /// `to`, turned as that, and returns near rest. Contact points are where the tool's frame goes;
+  /// normals point up. The trial holds joints and the hand's opening.
+  Result<Demonstration> Carry(const Target& from, const Target& to);
 
   /// The body's posture between trials.
   const Eigen::VectorXd& rest() const { return rest_; }
