@@ -65,7 +65,10 @@ void CommandStream::Run(bool realtime) {
       sample.positions[j] = setpoint.positions[j];
       sample.velocities[j] = setpoint.velocities[j];
     }
-    if (!writer_->Write(sample).ok()) failed_.fetch_add(1, std::memory_order_relaxed);
+    sample.has_hand_open = setpoint.hand_open >= 0;
+    sample.hand_open = sample.has_hand_open ? setpoint.hand_open : 0;
+    std::atomic<std::uint64_t>& count = writer_->Write(sample).ok() ? sent_ : failed_;
+    count.fetch_add(1, std::memory_order_release);
     taken_.store(next + 1, std::memory_order_release);
     taken_.notify_all();
   }

@@ -19,6 +19,7 @@ inline constexpr std::size_t kMaxJoints = 32;
 struct Setpoint {
   std::array<double, kMaxJoints> positions{};
   std::array<double, kMaxJoints> velocities{};
+  double hand_open = -1;  ///< from 0 (closed) to 1 (open); less: nothing is said of the hand
 };
 
 /// One producer. Put neither allocates nor waits.
@@ -33,7 +34,7 @@ class CommandStream {
 
   /// False when the ring is full: the command is dropped and counted.
   bool Put(const Setpoint& setpoint);
-  std::uint64_t sent() const { return writer_->sent(); }
+  std::uint64_t sent() const { return sent_.load(std::memory_order_acquire); }
   std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
   /// Writes that the network refused.
   std::uint64_t failed() const { return failed_.load(std::memory_order_relaxed); }
@@ -52,6 +53,7 @@ class CommandStream {
   std::atomic<std::uint64_t> put_{0};  ///< the top bit says that no more will come
   std::atomic<std::uint64_t> taken_{0};
   std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<std::uint64_t> sent_{0};
   std::atomic<std::uint64_t> failed_{0};
   std::thread thread_;  ///< last: begins when the rest stands
 };

@@ -82,6 +82,12 @@ std::vector<collision::AllowedTouch> Monitor::AllowedAt(double path_time_s, doub
   return allowed;
 }
 
+void Monitor::OpenHandAsAt(double path_time_s) {
+  if (plan_.trajectory.hand_open.empty()) return;
+  kinematics::SetHandOpening(robot_.model, motion::EvaluateHand(plan_.trajectory, path_time_s),
+                             full_joints_);
+}
+
 collision::Clearance Monitor::ClearanceOf(const Eigen::VectorXd& joints,
                                           const std::vector<collision::AllowedTouch>& allowed) {
   for (int j = 0; j < robot_.chain.dof(); ++j) {
@@ -158,6 +164,7 @@ std::optional<std::string> Monitor::LookAhead(const Measurement& measurement) {
       std::min(measurement.path_time_s + limits_.look_ahead_s, plan_.trajectory.duration_s());
   for (double t = measurement.path_time_s; t <= end_s; t += kLookStep_s) {
     motion::Evaluate(plan_.trajectory, t, ahead_, ahead_velocity_);
+    OpenHandAsAt(t);
     const collision::Clearance clearance = ClearanceOf(ahead_, AllowedAt(t, 0));
     if (clearance.distance_m >= limits_.clearance_m) continue;
     return "something moved into the way: " + FormatFixed(t - measurement.path_time_s, 2) +
@@ -182,6 +189,7 @@ std::optional<std::string> Monitor::Observe(const Measurement& measurement) {
     base_T_tool_.push_back(base_T_tool);
     tool_time_s_.push_back(measurement.elapsed_s);
   }
+  OpenHandAsAt(measurement.path_time_s);
   const collision::Clearance clearance =
       ClearanceOf(joints, AllowedAt(measurement.path_time_s, kArrival_s));
   smallest_clearance_m_ = std::min(smallest_clearance_m_, clearance.distance_m);

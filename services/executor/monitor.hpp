@@ -78,6 +78,7 @@ class Monitor {
 
  private:
   std::vector<collision::AllowedTouch> AllowedAt(double path_time_s, double later_s) const;
+  void OpenHandAsAt(double path_time_s);
   collision::Clearance ClearanceOf(const Eigen::VectorXd& joints,
                                    const std::vector<collision::AllowedTouch>& allowed);
   void NoteTouch(const Measurement& measurement, const geometry::Pose& base_T_tool);

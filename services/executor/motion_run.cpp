@@ -74,6 +74,12 @@ const Setpoint& MotionRun::Tick(double elapsed_s, State state, double speed) {
   FollowGuard(state);
   player_.Evaluate(position_, velocity_);
   AddSplice();
+  if (follower_ != nullptr) {
+    follower_->Correct(player_.time_s(), player_.rate(), elapsed_s, position_, velocity_);
+  }
+  if (!plan_.trajectory.hand_open.empty()) {
+    setpoint_.hand_open = motion::EvaluateHand(plan_.trajectory, player_.time_s());
+  }
   if (player_.at_end()) velocity_.setZero();
   for (Eigen::Index j = 0; j < position_.size(); ++j) {
     setpoint_.positions[static_cast<std::size_t>(j)] = position_[j];

@@ -28,6 +28,20 @@ inline constexpr double kSettle_s = 0.3;
 /// And so much longer at the end of the path, where it has not arrived by then.
 inline constexpr double kArrivalPatience_s = 0.7;
 
+/// Leads a motion away from its path while it is run through. Correct belongs to the control loop:
+/// it neither allocates nor waits.
+class PathFollower {
+ public:
+  virtual ~PathFollower() = default;
+  /// Changes what the path asks for at `path_time_s` of the plan, run through at `rate`,
+  /// `elapsed_s` after the call before.
+  virtual void Correct(double path_time_s, double rate, double elapsed_s,
+                       Eigen::Ref<Eigen::VectorXd> position,
+                       Eigen::Ref<Eigen::VectorXd> velocity) = 0;
+  /// What is wrong, if anything.
+  virtual std::optional<std::string> Problem() const = 0;
+};
+
 /// Three threads meet here: Tick and AddLateness belong to the control loop, Measure to the
 /// network, Watch and Report to whoever watches. Each is safe beside the others.
 class MotionRun {
@@ -39,6 +53,10 @@ class MotionRun {
   MotionRun(const MotionRun&) = delete;
   MotionRun& operator=(const MotionRun&) = delete;
 
+  /// Before the first Tick, if at all. It outlives the ticks.
+  void SetFollower(PathFollower* follower) { follower_ = follower; }
+  const PathFollower* follower() const { return follower_; }
+  const motion::PlannedMotion& plan() const { return plan_; }
   /// One cycle of the control loop, `elapsed_s` after the one before. Does not allocate.
   const Setpoint& Tick(double elapsed_s, State state, double speed);
   void AddLateness(Duration lateness) { lateness_.Add(lateness); }
@@ -83,6 +101,7 @@ class MotionRun {
   const motion::PlannedMotion plan_;
   const std::vector<GuardZone> zones_;
   PathPlayer player_;
+  PathFollower* follower_ = nullptr;
   std::size_t zone_ = 0;  ///< the next one
   Splice splice_;
   Setpoint setpoint_;

@@ -7,6 +7,13 @@
 
 namespace exemplar::executor {
 
+namespace {
+/// A hand that opens and closes by more takes things.
+constexpr double kGrasp = 0.2;
+/// Fingers stand on both sides of what they take: they may touch it until they are past its height.
+constexpr double kGraspMargin_m = 0.1;
+}  // namespace
+
 api::PlanSummary Summarise(const Planned& planned) {
   const motion::PlanReport& report = planned.motion.report;
   api::PlanSummary summary;
@@ -61,7 +68,9 @@ Result<std::vector<geometry::NamedPose>> Planner::ObjectsFor(
     seen_names += (seen_names.empty() ? "" : ", ") + seen.pose.name + " (" +
                   FormatFixed(seen.age_s, 1) + " s ago)";
     if (seen.age_s > ToSeconds(options_.object_patience)) continue;
-    if (!skill->target.empty() && seen.pose.name != skill->target) continue;
+    const bool met = std::any_of(skill->contacts.begin(), skill->contacts.end(),
+                                 [&](const auto& part) { return part.object == seen.pose.name; });
+    if (!skill->target.empty() && seen.pose.name != skill->target && !met) continue;
     objects.push_back(seen.pose);
   }
   if (objects.empty()) {
@@ -74,9 +83,15 @@ Result<std::vector<geometry::NamedPose>> Planner::ObjectsFor(
   return objects;
 }
 
+Result<std::string> Planner::TargetOf(const api::ExecuteRequest& request) const {
+  const Result<learning::SkillReport> skill = skills_.Show(request.skill, request.version);
+  if (!skill.ok()) return skill.error();
+  return skill->target;
+}
+
 Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
                               const std::optional<Eigen::VectorXd>& last_command,
-                              std::stop_token stop) const {
+                              std::stop_token stop, const Chase* chase) const {
   const Result<MeasuredState> measured = FreshState();
   if (!measured.ok()) return measured.error();
   Eigen::VectorXd start = measured->joints;
@@ -84,6 +99,7 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
       (*last_command - start).cwiseAbs().maxCoeff() <= options_.start_tolerance_rad) {
     start = *last_command;
   }
+  if (chase != nullptr && chase->start) start = *chase->start;
   Result<std::vector<geometry::NamedPose>> objects = ObjectsFor(request);
   if (!objects.ok()) return objects.error();
 
@@ -98,6 +114,7 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
   }
   Result<demonstration::SkillMotion> motion = skills_.Query(request.skill, request.version, query);
   if (!motion.ok()) return motion.error();
+  if (chase != nullptr) chase->adjust(*motion);
 
   // What is seen stands where it is seen, but what was asked for stands where it was asked for.
   std::vector<geometry::NamedPose> placed;
@@ -108,8 +125,8 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
   Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
       robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
   if (!checker.ok()) return checker.error();
-  Result<Planned> planned =
-      PlanGuarded(*motion, *std::move(checker), *measured, start, request.speed, stop);
+  Result<Planned> planned = PlanGuarded(*motion, *std::move(checker), *measured, start,
+                                        request.speed, chase == nullptr, stop);
   if (!planned.ok()) return planned;
   planned->objects = used;
   planned->placed = std::move(placed);
@@ -119,14 +136,18 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
 Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
                                      collision::CollisionChecker checker,
                                      const MeasuredState& measured, const Eigen::VectorXd& start,
-                                     double speed, const std::stop_token& stop) const {
+                                     double speed, bool guard, const std::stop_token& stop) const {
   motion::PlanOptions options = options_.plan;
   options.speed_scale = speed;
+  const auto [closed, open] = std::minmax_element(motion.hand_open.begin(), motion.hand_open.end());
+  if (!motion.hand_open.empty() && *open - *closed > kGrasp) {
+    options.touch_margin_m = std::max(options.touch_margin_m, kGraspMargin_m);
+  }
   std::vector<std::string> warnings = motion.warnings;
   std::vector<GuardZone> zones;
   Result<motion::PlannedMotion> planned = FailedPrecondition("not planned");
   std::optional<demonstration::SkillMotion> guarded;
-  if (options_.guard.touch_n > 0 && measured.feels_touch) {
+  if (guard && options_.guard.touch_n > 0 && measured.feels_touch) {
     guarded = WithGuard(motion, scene_, options_.guard);
   }
   if (guarded) {

@@ -1,6 +1,7 @@
 #pragma once
 // From a request to a checked motion: asks the skill, places what is seen, plans.
 
+#include <functional>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -42,6 +43,13 @@ struct Planned {
   int frames = 0;
 };
 
+/// Of a plan that follows a moving target.
+struct Chase {
+  /// Changes what the skill answered before it is planned. Presses then end by position.
+  std::function<void(demonstration::SkillMotion&)> adjust;
+  std::optional<Eigen::VectorXd> start;  ///< from where; else as ever
+};
+
 api::PlanSummary Summarise(const Planned& planned);
 
 /// Thread-safe.
@@ -53,8 +61,12 @@ class Planner {
 
   /// `last_command`: where the robot was told to be, where it was told anything.
   Result<Planned> Plan(const api::ExecuteRequest& request,
-                       const std::optional<Eigen::VectorXd>& last_command,
-                       std::stop_token stop) const;
+                       const std::optional<Eigen::VectorXd>& last_command, std::stop_token stop,
+                       const Chase* chase = nullptr) const;
+
+  const PlannerOptions& options() const { return options_; }
+  /// What the skill is about. Errors as the skill service's.
+  Result<std::string> TargetOf(const api::ExecuteRequest& request) const;
 
   /// Refuses a motion whose first point the robot is not near, or of which nobody knows.
   Status CheckStart(const motion::PlannedMotion& plan) const;
@@ -70,7 +82,7 @@ class Planner {
   /// Guarded where there is a press, a touch sensor and room for it.
   Result<Planned> PlanGuarded(const demonstration::SkillMotion& motion,
                               collision::CollisionChecker checker, const MeasuredState& measured,
-                              const Eigen::VectorXd& start, double speed,
+                              const Eigen::VectorXd& start, double speed, bool guard,
                               const std::stop_token& stop) const;
   Result<std::vector<geometry::NamedPose>> ObjectsFor(const api::ExecuteRequest& request) const;
 

@@ -7,6 +7,7 @@ void ToProto(const api::ExecuteRequest& request, v1::SkillExecution* message) {
   message->mutable_skill()->set_version(request.version);
   ToProto(request.objects, message->mutable_objects());
   message->set_speed(request.speed);
+  message->set_follow(request.follow);
   if (request.start) ToProto(*request.start, true, message->mutable_start());
 }
 
@@ -22,6 +23,7 @@ Result<api::ExecuteRequest> FromProto(const v1::SkillExecution& message, std::st
       FromProto(message.objects(), place + ".objects");
   if (!objects) return objects.error();
   request.objects = *std::move(objects);
+  request.follow = message.follow();
   if (message.has_start()) {
     Result<ReadPose> start = FromProto(message.start(), place + ".start");
     if (!start) return start.error();
