@@ -48,6 +48,9 @@ Following::Following(const Clock& clock, Log& log, const FollowingPlanner& plann
   path_.store(paths_.back().get());
   Take(target_);
   used_aim_ = aim_;
+}
+
+void Following::Start() {
   thread_ = std::jthread([this](const std::stop_token& stop) { PlanLoop(stop); });
 }
 
@@ -195,8 +198,11 @@ void Following::PlanLoop(const std::stop_token& stop) {
 }
 
 void Following::PlanOnce(const std::stop_token& stop) {
+  // Where the target is lost Judge says so; where the motion is slowed down the plan comes later.
   const auto seen = planner_.Seen(target_);
-  if (!seen.ok() || rate_.load() < 1) return;  // lost: Judge says so; slowed down: it comes later
+  if (!seen.ok() || rate_.load() < 1 || path_time_s_.load() > times_.contact_s - kLastPlan_s) {
+    return;
+  }
   // The motion may have been held on its way: the contact comes that much later.
   const Duration start = clock_.Steady() - FromSeconds(path_time_s_.load());
   const Duration contact = start + FromSeconds(times_.contact_s);

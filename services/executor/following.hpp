@@ -98,6 +98,10 @@ class Following final : public PathFollower {
             const FollowingPlan& plan, const motion::PlannedMotion& first);
   ~Following() override;
 
+  /// Plans anew beside the motion, whenever the target was seen, until it is destroyed.
+  void Start();
+  /// Plans anew once, as the thread of Start does; not beside it.
+  void PlanOnce(const std::stop_token& stop);
   /// Something was seen.
   void Take(const std::string& object);
 
@@ -118,7 +122,6 @@ class Following final : public PathFollower {
   };
   void SetAim(const TargetTrack& track);
   void PlanLoop(const std::stop_token& stop);
-  void PlanOnce(const std::stop_token& stop);
   void Judge(double path_time_s, double residual_m, Duration now);
   Eigen::Vector3d Wanted(const FollowedPath& path, std::size_t frame, double part, Duration now);
 
