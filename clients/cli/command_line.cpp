@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
 
 #include "exemplar/base/text.hpp"
 
@@ -93,15 +94,62 @@ std::string Explain(const CLI::App* root, const CLI::ParseError& error) {
   return FullName(app) + ": " + error.what();
 }
 
+/// Of a word that begins with dashes, the option that the command or those above it have.
+const CLI::Option* FindOption(const CLI::App* app, const std::string& word) {
+  const std::string name = word.substr(0, word.find('='));
+  for (; app != nullptr; app = app->get_parent()) {
+    for (const CLI::Option* option : app->get_options({})) {
+      if (option->nonpositional() && option->check_name(name)) return option;
+    }
+  }
+  return nullptr;
+}
+
+const CLI::App* FindCommand(const CLI::App* app, const std::string& word) {
+  for (const CLI::App* command : app->get_subcommands({})) {
+    if (command->get_name() == word) return command;
+  }
+  return nullptr;
+}
+
+/// Without what follows the first sentence or line.
+std::string Brief(const std::string& help) { return help.substr(0, help.find('\n')); }
+
+/// Troff's own characters in text.
+std::string Roff(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '\\' || c == '-') out += '\\';
+    if ((c == '.' || c == '\'') && (out.empty() || out.back() == '\n')) out += "\\&";
+    out += c;
+  }
+  return out;
+}
+
+void AppendManual(const CLI::App* app, std::string& page) {
+  if (app->get_subcommands({}).empty()) {
+    page += ".SS " + Roff(FullName(app)) + "\n.nf\n" +
+            Roff(app->help(FullName(app->get_parent()), CLI::AppFormatMode::Normal)) + "\n.fi\n";
+  }
+  for (const CLI::App* command : app->get_subcommands({})) AppendManual(command, page);
+}
+
 }  // namespace
+
+struct Command::Shared {
+  std::function<int()> chosen;
+  std::map<const CLI::Option*, Names> names;
+  std::map<const CLI::Option*, std::vector<std::string>> choices;
+};
 
 Command Command::Add(const std::string& name, const std::string& summary,
                      const std::vector<std::string>& examples) {
   CLI::App* added = app_->add_subcommand(name, summary);
   added->fallthrough();
-  added->footer(Footer(examples, "--server and --timeout as in \"exemplar --help\"."));
+  added->footer(
+      Footer(examples, "--server, --timeout, --tls-ca and --token as in \"exemplar --help\"."));
   app_->require_subcommand(1);
-  return {added, chosen_};
+  return {added, shared_};
 }
 
 Command& Command::Argument(const std::string& name, std::string& value, const std::string& help) {
@@ -118,6 +166,12 @@ Command& Command::OptionalArgument(const std::string& name, std::string& value,
 Command& Command::Arguments(const std::string& name, std::vector<std::string>& values,
                             const std::string& help) {
   last_ = app_->add_option(name, values, help)->required()->type_name("");
+  return *this;
+}
+
+Command& Command::OptionalArguments(const std::string& name, std::vector<std::string>& values,
+                                    const std::string& help) {
+  last_ = app_->add_option(name, values, help)->type_name("");
   return *this;
 }
 
@@ -167,6 +221,7 @@ Command& Command::OneOf(const std::vector<std::string>& choices) {
       },
       "");
   last_->check(one_of)->type_name(Join(choices, "|"));
+  shared_->choices[last_] = choices;
   return *this;
 }
 
@@ -175,14 +230,21 @@ Command& Command::FromEnvironment(const std::string& variable) {
   return *this;
 }
 
+Command& Command::Completes(Names names) {
+  shared_->names[last_] = names;
+  return *this;
+}
+
 void Command::Runs(std::function<int()> action) {
-  app_->callback([chosen = chosen_, action = std::move(action)] { *chosen = action; });
+  app_->callback([shared = shared_, action = std::move(action)] { shared->chosen = action; });
 }
 
 CommandLine::CommandLine(const std::string& program, const std::string& summary,
                          const std::string& version, const std::vector<std::string>& examples,
                          const std::string& notes)
-    : app_(std::make_unique<CLI::App>(summary, program)), root_(app_.get(), &chosen_) {
+    : app_(std::make_unique<CLI::App>(summary, program)),
+      shared_(std::make_unique<Command::Shared>()),
+      root_(app_.get(), shared_.get()) {
   app_->set_version_flag("--version", program + " " + version);
   app_->footer(Footer(examples, notes));
   const auto formatter = std::make_shared<Formatter>();
@@ -203,7 +265,77 @@ int CommandLine::Run(int argc, char** argv) {
               << " --help\".\n";
     return kUsage;
   }
-  return chosen_ ? chosen_() : kUsage;
+  return shared_->chosen ? shared_->chosen() : kUsage;
+}
+
+Completion CommandLine::Complete(const std::vector<std::string>& words) const {
+  const CLI::App* app = app_.get();
+  const CLI::Option* valued = nullptr;  ///< the option whose value comes next
+  std::size_t arguments = 0;
+  for (std::size_t i = 0; i + 1 < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (valued != nullptr) {
+      valued = nullptr;
+    } else if (word.starts_with("-")) {
+      const CLI::Option* option = FindOption(app, word);
+      const bool takes = option != nullptr && option->get_expected_max() > 0;
+      if (takes && word.find('=') == std::string::npos) valued = option;
+    } else if (const CLI::App* command = FindCommand(app, word)) {
+      app = command;
+      arguments = 0;
+    } else {
+      ++arguments;
+    }
+  }
+  Completion completion;
+  const std::string current = words.empty() ? std::string() : words.back();
+  const auto offer = [&](const std::string& word, const std::string& help) {
+    if (word.starts_with(current)) completion.candidates.push_back({word, Brief(help)});
+  };
+  const auto values_of = [&](const CLI::Option* option) {
+    if (const auto found = shared_->choices.find(option); found != shared_->choices.end()) {
+      for (const std::string& choice : found->second) offer(choice, {});
+    }
+    const auto found = shared_->names.find(option);
+    if (found != shared_->names.end()) completion.names = found->second;
+  };
+  if (valued != nullptr) {
+    values_of(valued);
+    return completion;
+  }
+  if (current.starts_with("-")) {
+    for (const CLI::App* one = app; one != nullptr; one = one->get_parent()) {
+      for (const CLI::Option* option : one->get_options({})) {
+        for (const std::string& name : option->get_lnames()) {
+          if (one == app || name != "help") offer("--" + name, option->get_description());
+        }
+      }
+    }
+    return completion;
+  }
+  for (const CLI::App* command : app->get_subcommands({})) {
+    offer(command->get_name(), command->get_description());
+  }
+  std::vector<const CLI::Option*> positionals;
+  for (const CLI::Option* option : app->get_options({})) {
+    if (option->get_positional()) positionals.push_back(option);
+  }
+  if (!positionals.empty()) {
+    const bool in_range = arguments < positionals.size();
+    const CLI::Option* option = in_range ? positionals[arguments] : positionals.back();
+    if (in_range || option->get_expected_max() > 1) values_of(option);
+  }
+  return completion;
+}
+
+std::string CommandLine::ManualPage() const {
+  const std::string& name = app_->get_name();
+  std::string page = ".TH " + name + " 1\n.SH NAME\n" + name + " \\- " +
+                     Roff(app_->get_description()) + "\n.SH SYNOPSIS\n.B " + name +
+                     "\n[OPTIONS] COMMAND ...\n.SH OPTIONS\n.nf\n" + Roff(app_->help()) +
+                     "\n.fi\n.SH COMMANDS\n";
+  AppendManual(app_.get(), page);
+  return page;
 }
 
 }  // namespace exemplar::cli

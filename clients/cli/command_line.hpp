@@ -2,6 +2,7 @@
 // Commands with subcommands, on CLI11, which only command_line.cpp includes.
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,19 @@ namespace exemplar::cli {
 /// The exit code of bad usage.
 inline constexpr int kUsage = 2;
 
+/// What an argument or an option's value names, for completion.
+enum class Names { kNothing, kFiles, kFolders, kSkills, kTrials, kTopics, kParticipants };
+
+/// One way to go on with what was typed.
+struct Candidate {
+  std::string word;
+  std::string help;
+};
+struct Completion {
+  std::vector<Candidate> candidates;
+  Names names = Names::kNothing;  ///< more are these
+};
+
 /// A command or a group of commands. A handle: cheap to copy; its CommandLine must outlive it, and
 /// so must the variables that options are bound to.
 class Command {
@@ -30,6 +44,8 @@ class Command {
   Command& OptionalArgument(const std::string& name, std::string& value, const std::string& help);
   Command& Arguments(const std::string& name, std::vector<std::string>& values,
                      const std::string& help);
+  Command& OptionalArguments(const std::string& name, std::vector<std::string>& values,
+                             const std::string& help);
   /// `name` with dashes; `type` as --help shows its value. The variable's value is the default.
   Command& Option(const std::string& name, const std::string& type, std::string& value,
                   const std::string& help);
@@ -46,16 +62,18 @@ class Command {
   Command& Required();
   Command& OneOf(const std::vector<std::string>& choices);
   Command& FromEnvironment(const std::string& variable);
+  Command& Completes(Names names);
 
   /// What the command does: returns the exit code.
   void Runs(std::function<int()> action);
 
  private:
   friend class CommandLine;
-  Command(CLI::App* app, std::function<int()>* chosen) : app_(app), chosen_(chosen) {}
+  struct Shared;
+  Command(CLI::App* app, Shared* shared) : app_(app), shared_(shared) {}
 
   CLI::App* app_;
-  std::function<int()>* chosen_;
+  Shared* shared_;
   CLI::Option* last_ = nullptr;
 };
 
@@ -72,10 +90,14 @@ class CommandLine {
   /// Parses, and does what the command does. --help and --version print to stdout; what is wrong
   /// with the words goes to stderr, with the nearest right one.
   int Run(int argc, char** argv);
+  /// How the last of `words`, those behind the program's name, may go on; it may be empty.
+  Completion Complete(const std::vector<std::string>& words) const;
+  /// A manual page (section 1) of all commands.
+  std::string ManualPage() const;
 
  private:
   std::unique_ptr<CLI::App> app_;
-  std::function<int()> chosen_;
+  std::unique_ptr<Command::Shared> shared_;
   Command root_;
 };
 

@@ -1,5 +1,11 @@
 // exemplar: the command line to all services.
 
+#include <algorithm>
+#include <cstdlib>
+#include <iostream>
+#include <string>
+#include <vector>
+
 #include "commands.hpp"
 #include "exemplar/program/runtime.hpp"
 
@@ -15,13 +21,42 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done, 2 bad usage, 3 not found, 4 refused as invalid or unsafe,\n"
       "5 no service answers, 1 anything else.");
   line.root()
-      .Option("--server", "HOST:PORT", session.server, "the gateway, or a service directly")
+      .Option("--server", "HOST:PORT", session.server,
+              std::string("the gateway, or a service directly (default: ") +
+                  cli::Session::kDefaultServer + ")")
       .FromEnvironment("EXEMPLAR_SERVER")
       .Option("--timeout", "SECONDS", session.timeout_s,
-              "limit of each call (default: 30; none to learn, plan and execute)");
+              "limit of each call (default: 30; none to learn, plan and execute)")
+      .Option("--tls-ca", "FILE", session.credentials.ca,
+              "PEM file of the CA that the server's certificate comes from")
+      .FromEnvironment("EXEMPLAR_TLS_CA")
+      .Completes(cli::Names::kFiles)
+      .Option("--tls-cert", "FILE", session.credentials.certificate,
+              "PEM file with your own certificate, and")
+      .FromEnvironment("EXEMPLAR_TLS_CERT")
+      .Completes(cli::Names::kFiles)
+      .Option("--tls-key", "FILE", session.credentials.key, "with its key")
+      .FromEnvironment("EXEMPLAR_TLS_KEY")
+      .Completes(cli::Names::kFiles)
+      .Option("--token", "TOKEN", session.credentials.token,
+              "sent with each call; @FILE reads a file")
+      .FromEnvironment("EXEMPLAR_TOKEN");
   cli::AddTrialCommands(line.root(), session);
   cli::AddSkillCommands(line.root(), session);
   cli::AddRobotCommands(line.root(), session);
   cli::AddRecordCommands(line.root(), session);
+  cli::AddWatchCommand(line.root(), session);
+  cli::AddDoctorCommand(line.root(), session);
+  cli::AddCompletionCommand(line.root());
+
+  const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (!words.empty() && words.front() == "__complete") {
+    if (const char* server = std::getenv("EXEMPLAR_SERVER")) session.server = server;
+    return cli::PrintCompletion(line, session, {words.begin() + 1, words.end()});
+  }
+  if (words == std::vector<std::string>{"__manual"}) {
+    std::cout << line.ManualPage();
+    return 0;
+  }
   return line.Run(argc, argv);
 }

@@ -18,6 +18,7 @@ struct Words {
   std::vector<std::string> objects;
   std::optional<double> speed;
   bool wait = false;
+  bool follow = false;
 };
 
 Result<demonstration::SkillQuery> ReadQuery(const Words& words) {
@@ -99,6 +100,11 @@ Result<api::ExecuteRequest> ReadExecution(const Words& words) {
     }
   }
   request.detached = !words.wait;
+  request.follow = words.follow;
+  if (request.follow && !request.objects.empty()) {
+    return InvalidArgument("--follow takes the target where it is seen: leave --object away",
+                           "--follow");
+  }
   return request;
 }
 
@@ -204,6 +210,7 @@ void AddMotionCommands(Command& skill, const Session& session) {
                  "go there first (default: from where the tool is)");
   command.Option("--speed", "FACTOR", words->speed, "over 0 and at most 1 (default: 1)");
   command.Flag("--wait", words->wait, "until the motion has ended");
+  command.Flag("--follow", words->follow, "the target moves: meet it where it will be");
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] { return Execute(session, *words); });
 }

@@ -1,9 +1,11 @@
 #include "screen.hpp"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <iostream>
 
 #include "exemplar/base/text.hpp"
@@ -18,9 +20,69 @@ std::size_t Width(std::string_view text) {
   }));
 }
 
+/// Rows and columns of the terminal at stdout; the usual ones where it does not say.
+winsize TerminalSize() {
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row == 0 || size.ws_col == 0) {
+    size.ws_row = 24;
+    size.ws_col = 80;
+  }
+  return size;
+}
+
 bool IsNumber(std::string_view text) { return text == "-" || ParseDouble(text).has_value(); }
 
 }  // namespace
+
+bool IsTerminal(int file) {
+  const char* kind = std::getenv("TERM");
+  return isatty(file) == 1 && (kind == nullptr || std::string_view(kind) != "dumb");
+}
+
+std::string Paint(std::string_view text, Colour colour, int file) {
+  const char* unwanted = std::getenv("NO_COLOR");
+  if ((unwanted != nullptr && *unwanted != '\0') || !IsTerminal(file)) return std::string(text);
+  const char* code = "1";
+  switch (colour) {
+    case Colour::kRed:
+      code = "31";
+      break;
+    case Colour::kYellow:
+      code = "33";
+      break;
+    case Colour::kGreen:
+      code = "32";
+      break;
+    case Colour::kBold:
+      code = "1";
+      break;
+    case Colour::kFaint:
+      code = "2";
+      break;
+  }
+  return std::string("\033[") + code + 'm' + std::string(text) + "\033[0m";
+}
+
+void LiveText::Show(const std::string& text) {
+  const winsize size = TerminalSize();
+  std::string drawn = lines_ > 0 ? "\033[" + std::to_string(lines_) + "A\r\033[J" : std::string();
+  lines_ = 0;
+  for (const std::string_view line : Split(text, '\n')) {
+    if (lines_ + 1 >= size.ws_row) break;
+    std::size_t bytes = 0;
+    int columns = 0;
+    bool escape = false;
+    while (bytes < line.size() && (columns < size.ws_col || escape)) {
+      const char c = line[bytes++];
+      if (c == '\033') escape = true;
+      if (!escape && (static_cast<unsigned char>(c) & 0xc0) != 0x80) ++columns;
+      if (escape && c == 'm') escape = false;
+    }
+    drawn += std::string(line.substr(0, bytes)) + "\033[K\n";
+    ++lines_;
+  }
+  std::cout << drawn << std::flush;
+}
 
 Table::Table(std::vector<std::string> header) { rows_.push_back(std::move(header)); }
 
@@ -48,12 +110,12 @@ std::string Table::Text(int indent) const {
       if (c + 1 < columns) line += "  ";
     }
     line.erase(line.find_last_not_of(' ') + 1);
-    text += line + '\n';
+    text += (&row == &rows_.front() ? Paint(line, Colour::kBold, STDOUT_FILENO) : line) + '\n';
   }
   return text;
 }
 
-ProgressDisplay::ProgressDisplay() : terminal_(isatty(STDERR_FILENO) == 1) {}
+ProgressDisplay::ProgressDisplay() : terminal_(IsTerminal(STDERR_FILENO)) {}
 
 ProgressDisplay::~ProgressDisplay() { Clear(); }
 
@@ -69,8 +131,9 @@ void ProgressDisplay::Show(double fraction, std::string_view step, std::string_v
   const int full = static_cast<int>(std::lround(part * kBar));
   std::string percent = std::to_string(static_cast<int>(std::lround(part * 100)));
   percent.insert(0, 3 - std::min<std::size_t>(3, percent.size()), ' ');
-  std::cerr << "\r\033[K[" << std::string(full, '#') << std::string(kBar - full, '.') << "] "
-            << percent << " % " << step << (detail.empty() ? "" : "  ") << detail << std::flush;
+  std::cerr << "\r\033[K[" << Paint(std::string(full, '#'), Colour::kGreen, STDERR_FILENO)
+            << std::string(kBar - full, '.') << "] " << percent << " % " << step
+            << (detail.empty() ? "" : "  ") << detail << std::flush;
   drawn_ = true;
 }
 

@@ -11,12 +11,14 @@
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/program/runtime.hpp"
+#include "screen.hpp"
 
 namespace exemplar::cli {
 
-Result<rpc::Clients> Session::Connect() const {
+Result<rpc::ClientOptions> Session::Options() const {
   rpc::ClientOptions options;
-  options.server = server;
+  options.server = server.empty() ? kDefaultServer : server;
+  options.credentials = credentials;
   if (timeout_s) {
     constexpr double kLongest = 1e6;
     if (!(*timeout_s > 0 && *timeout_s <= kLongest)) {
@@ -27,25 +29,37 @@ Result<rpc::Clients> Session::Connect() const {
     options.timeout = FromSeconds(*timeout_s);
     options.long_timeout = options.timeout;
   }
-  return rpc::Connect(options);
+  return options;
 }
 
-int Fail(const Error& error) { return program::Fail("exemplar", error); }
+Result<rpc::Clients> Session::Connect() const {
+  const Result<rpc::ClientOptions> options = Options();
+  return options ? rpc::Connect(*options) : options.error();
+}
+
+int Fail(const Error& error) {
+  return program::Fail(Paint("exemplar", Colour::kRed, STDERR_FILENO), error);
+}
 
 int FailUsage(const Error& error) {
-  program::Fail("exemplar", error);
+  Fail(error);
   return kUsage;
 }
 
 void Warn(const std::vector<std::string>& warnings) {
+  const std::string word = Paint("warning", Colour::kYellow, STDERR_FILENO);
   for (const std::string& warning : warnings) {
-    std::cerr << "exemplar: warning: " << warning << '\n';
+    std::cerr << "exemplar: " << word << ": " << warning << '\n';
   }
 }
 
 void AddFormat(Command& command, std::string& format, const std::vector<std::string>& formats) {
   format = formats.front();
   command.Option("--format", "", format, "how the answer is printed").OneOf(formats);
+}
+
+void PrintLine(const nlohmann::json& json) {
+  std::cout << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
 }
 
 void Print(const nlohmann::json& json) {

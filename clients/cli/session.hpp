@@ -16,10 +16,14 @@ namespace exemplar::cli {
 
 /// The options that stand for every command.
 struct Session {
-  std::string server = "127.0.0.1:50051";
+  static constexpr const char* kDefaultServer = "127.0.0.1:50051";
+  std::string server;  ///< empty: none was named
   std::optional<double> timeout_s;
+  security::ClientCredentials credentials;
 
-  /// Errors: an address or a limit that is none.
+  /// Errors: as Connect.
+  Result<rpc::ClientOptions> Options() const;
+  /// Errors: an address or a limit that is none, credentials that cannot be read.
   Result<rpc::Clients> Connect() const;
 };
 
@@ -34,6 +38,8 @@ void Warn(const std::vector<std::string>& warnings);
 void AddFormat(Command& command, std::string& format, const std::vector<std::string>& formats);
 
 void Print(const nlohmann::json& json);
+/// On one line, at once: for streams of objects.
+void PrintLine(const nlohmann::json& json);
 /// To stdout, or to a file that is written whole or not at all.
 Status Write(std::string_view text, const std::string& output);
 
