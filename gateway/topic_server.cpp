@@ -71,6 +71,16 @@ class Described {
   std::unordered_map<std::string, Topic> topics_;
 };
 
+/// One of those who are served, for as long as it lives.
+struct Place {
+  explicit Place(std::atomic<int>& the_count) : count(the_count), number(++count) {}
+  ~Place() { --count; }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+  std::atomic<int>& count;
+  const int number;
+};
+
 }  // namespace
 
 Result<std::vector<api::TopicInfo>> TopicServer::List(const std::vector<std::string>& topics) {
@@ -82,6 +92,12 @@ Result<std::vector<api::TopicInfo>> TopicServer::List(const std::vector<std::str
 Status TopicServer::Subscribe(const api::TopicSubscription& request,
                               const std::function<bool(const api::TopicBatch&)>& on_batch,
                               std::stop_token stop) {
+  const Place place(subscriptions_);
+  if (place.number > options_.subscriptions) {
+    return Error{ErrorCode::kResourceExhausted,
+                 "there are " + std::to_string(options_.subscriptions) +
+                     " subscriptions, the most that this gateway takes"};
+  }
   const int queue = request.queue == 0 ? options_.queue : std::min(request.queue, options_.queue);
   Result<std::unique_ptr<Subscription>> subscription =
       hub_.Subscribe({.topics = request.topics,

@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -8,6 +9,8 @@
 namespace exemplar::gateway {
 
 struct TopicServerOptions {
+  /// Each holds a thread of the caller's; more are refused.
+  int subscriptions = 256;
   /// What may wait for one client, and what a client may ask for at most.
   int queue = 10000;
   std::size_t queue_bytes = std::size_t{64} << 20;
@@ -31,6 +34,7 @@ class TopicServer final : public api::TopicApi {
  private:
   TopicHub& hub_;
   const TopicServerOptions options_;
+  std::atomic<int> subscriptions_{0};
 };
 
 }  // namespace exemplar::gateway

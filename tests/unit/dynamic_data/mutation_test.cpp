@@ -46,7 +46,9 @@ TEST(Mutations, BytesThatAreTakenComeBackFromTheirJson) {
     ++taken;
     const auto again = FromJson(*type, *json);
     // A char of half a character has no JSON that reads back.
-    if (again.ok()) ASSERT_EQ(*ToJson(*type, *again), *json);
+    if (again.ok()) {
+      ASSERT_EQ(*ToJson(*type, *again), *json);
+    }
   }
   EXPECT_GT(taken, kRounds / 100);
 }

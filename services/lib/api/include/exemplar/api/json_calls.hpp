@@ -37,10 +37,10 @@ struct JsonCall {
 /// Why a call failed, as HTTP says it.
 struct JsonFailure {
   int http_status = 500;
-  std::string code;  ///< "invalid_argument", ...; also "unauthenticated", "permission_denied" and
-                     ///< "unimplemented"
-  std::string message;
-  std::string field;
+  std::string code = {};  ///< "invalid_argument", ...; also "unauthenticated", "permission_denied"
+                          ///< and "unimplemented"
+  std::string message = {};
+  std::string field = {};
 };
 
 /// Thread-safe.
