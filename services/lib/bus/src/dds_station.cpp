@@ -119,18 +119,19 @@ class DdsReader final : public ByteReader {
 class Station final : public DdsStation {
  public:
   Station(ParticipantPtr participant, dds::Publisher& publisher, dds::Subscriber& subscriber,
-          const Clock& clock)
+          const ParticipantOptions& options)
       : participant_(std::move(participant)),
         publisher_(publisher),
         subscriber_(subscriber),
-        clock_(clock) {}
+        clock_(*options.clock),
+        security_(options.security) {}
 
   Result<std::unique_ptr<ByteWriter>> MakeWriter(const std::string& topic, const TypeInfo& type,
                                                  const TopicQos& qos) override {
     Result<dds::Topic*> made = FindOrMakeTopic(topic, type);
     if (!made.ok()) return made.error();
     dds::DataWriter* writer = publisher_.create_datawriter(*made, WriterQos(qos, type.schema));
-    if (writer == nullptr) return Internal("topic " + topic + ": Fast DDS refused the writer");
+    if (writer == nullptr) return Refused(topic, "write");
     return std::unique_ptr<ByteWriter>(
         std::make_unique<DdsWriter>(publisher_, *writer, topic, qos.reliable));
   }
@@ -144,12 +145,22 @@ class Station final : public DdsStation {
     dds::DataReader* reader = subscriber_.create_datareader(
         *made, ReaderQos(qos.reliable, qos.transient_local, qos.depth * qos.max_instances),
         gate.get(), dds::StatusMask::data_available());
-    if (reader == nullptr) return Internal("topic " + topic + ": Fast DDS refused the reader");
+    if (reader == nullptr) return Refused(topic, "read");
     return std::unique_ptr<ByteReader>(
         std::make_unique<DdsReader>(subscriber_, *reader, std::move(gate)));
   }
 
  private:
+  Error Refused(const std::string& topic, const char* verb) const {
+    if (security_.empty()) {
+      return Internal("topic " + topic + ": Fast DDS lets nobody " + verb + " it");
+    }
+    return FailedPrecondition("topic " + topic + ": the permissions in " + security_ +
+                                  " do not let this program " + verb +
+                                  " it; `exemplar security issue` gives others by role",
+                              "security");
+  }
+
   Result<dds::Topic*> FindOrMakeTopic(const std::string& topic, const TypeInfo& type) {
     const std::lock_guard lock(mutex_);
     const std::string type_name(type.name);
@@ -170,6 +181,7 @@ class Station final : public DdsStation {
   dds::Publisher& publisher_;
   dds::Subscriber& subscriber_;
   const Clock& clock_;
+  const std::string security_;
   std::mutex mutex_;
   std::map<std::string, dds::Topic*> topics_;
 };
@@ -180,16 +192,18 @@ Result<std::unique_ptr<DdsStation>> DdsStation::Create(const ParticipantOptions&
   Result<ParticipantPtr> participant = MakeDdsParticipant(options, nullptr);
   if (!participant.ok()) return participant.error();
   dds::PublisherQos publisher_qos;
-  publisher_qos.partition().push_back(options.station.c_str());
   dds::SubscriberQos subscriber_qos;
-  subscriber_qos.partition().push_back(options.station.c_str());
+  if (!options.station.empty()) {
+    publisher_qos.partition().push_back(options.station.c_str());
+    subscriber_qos.partition().push_back(options.station.c_str());
+  }
   dds::Publisher* publisher = (*participant)->create_publisher(publisher_qos);
   dds::Subscriber* subscriber = (*participant)->create_subscriber(subscriber_qos);
   if (publisher == nullptr || subscriber == nullptr) {
     return Internal("Fast DDS made no publisher or subscriber");
   }
   return std::unique_ptr<DdsStation>(
-      std::make_unique<Station>(std::move(*participant), *publisher, *subscriber, *options.clock));
+      std::make_unique<Station>(std::move(*participant), *publisher, *subscriber, options));
 }
 
 }  // namespace exemplar::bus

@@ -3,17 +3,30 @@
 namespace exemplar::rpc {
 
 void CallLog::Record(const CallRecord& call) {
-  const std::string code(call.status ? "ok" : ToString(call.status.error().code));
+  const std::string code(!call.outcome.empty() ? call.outcome
+                         : call.status         ? "ok"
+                                               : ToString(call.status.error().code));
   const double seconds = ToSeconds(call.duration);
+  if (call.audited) {
+    log_.Info("audit", {{"caller", call.caller.empty() ? "anybody" : call.caller},
+                        {"method", call.method},
+                        {"target", call.target},
+                        {"request_id", call.request_id},
+                        {"peer", call.peer},
+                        {"outcome", code},
+                        {"seconds", seconds}});
+  }
   if (call.status) {
     log_.Debug("call", {{"method", call.method},
                         {"request_id", call.request_id},
                         {"peer", call.peer},
+                        {"caller", call.caller},
                         {"seconds", seconds}});
   } else {
     log_.Warning("call failed", {{"method", call.method},
                                  {"request_id", call.request_id},
                                  {"peer", call.peer},
+                                 {"caller", call.caller},
                                  {"seconds", seconds},
                                  {"code", code},
                                  {"field", call.status.error().field},

@@ -31,11 +31,30 @@ grpc::StatusCode CodeOf(ErrorCode code) {
   return grpc::StatusCode::INTERNAL;
 }
 
+/// What may be wrong where a connection was made and broke at once.
+std::string HintOf(const std::string& message) {
+  const auto says = [&message](const char* words) {
+    return message.find(words) != std::string::npos;
+  };
+  if (says("certificate verify failed")) {
+    return " (the server's certificate is not of --tls-ca, or has expired)";
+  }
+  if (says("handshak") || says("SSL") || says("Peer name")) {
+    return " (does the server want TLS, and a certificate of the caller?)";
+  }
+  if (says("Socket closed") || says("reset by peer") || says("Broken pipe") ||
+      says("Endpoint closing")) {
+    return " (if the server wants TLS: --tls-ca)";
+  }
+  return {};
+}
+
 /// What an error without our detail means: it came from gRPC itself or a server that is not ours.
 Error WithoutDetail(const grpc::Status& status, const std::string& address) {
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:
-      return Unavailable("no answer from " + address + ": " + status.error_message());
+      return Unavailable("no answer from " + address + ": " + status.error_message() +
+                         HintOf(status.error_message()));
     case grpc::StatusCode::DEADLINE_EXCEEDED:
       return {ErrorCode::kDeadlineExceeded, address + " did not answer in time"};
     case grpc::StatusCode::CANCELLED:
@@ -66,10 +85,12 @@ Error WithoutDetail(const grpc::Status& status, const std::string& address) {
 }  // namespace
 
 grpc::Status ToGrpc(const Status& status) {
-  if (status) return grpc::Status::OK;
+  return status ? grpc::Status::OK : ToGrpc(status.error(), CodeOf(status.error().code));
+}
+
+grpc::Status ToGrpc(const Error& error, grpc::StatusCode code) {
   v1::ErrorDetail detail;
-  ToProto(status.error(), &detail);
-  const grpc::StatusCode code = CodeOf(status.error().code);
+  ToProto(error, &detail);
   v1::CallStatus all;
   all.set_code(code);
   all.set_message(detail.message());

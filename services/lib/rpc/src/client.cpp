@@ -1,7 +1,6 @@
 #include "exemplar/rpc/client.hpp"
 
 #include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
 
 #include <chrono>
 #include <limits>
@@ -9,6 +8,7 @@
 #include "client_call.hpp"
 #include "exemplar/base/ids.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/rpc/metadata.hpp"
 
 namespace exemplar::rpc {
 namespace {
@@ -25,7 +25,8 @@ std::string MakeRequestId(const ClientOptions& options) {
   return MakeId("request", rng);
 }
 
-std::shared_ptr<grpc::Channel> MakeChannel(const ClientOptions& options) {
+std::shared_ptr<grpc::Channel> MakeChannel(
+    const std::string& server, const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments;
   // A proxy set for the browser must not come between a robot and its services.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
@@ -34,13 +35,16 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ClientOptions& options) {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
   arguments.SetMaxReceiveMessageSize(std::numeric_limits<int>::max());
-  return grpc::CreateCustomChannel(options.server, grpc::InsecureChannelCredentials(), arguments);
+  return grpc::CreateCustomChannel(server, credentials, arguments);
 }
 
 }  // namespace
 
-Connection::Connection(const ClientOptions& options)
-    : options_(options), request_id_(MakeRequestId(options)), channel_(MakeChannel(options)) {}
+Connection::Connection(const ClientOptions& options, const ChannelSecurity& security)
+    : options_(options),
+      request_id_(MakeRequestId(options)),
+      authorization_(security.token.empty() ? "" : "Bearer " + security.token),
+      channel_(MakeChannel(options.server, security.credentials)) {}
 
 Result<std::shared_ptr<Connection>> Connection::Create(const ClientOptions& options) {
   const std::string& server = options.server;
@@ -51,7 +55,10 @@ Result<std::shared_ptr<Connection>> Connection::Create(const ClientOptions& opti
   if (colon == 0 || !port || *port < 1 || *port > 65535) {
     return InvalidArgument("server address \"" + server + "\" is not HOST:PORT", "server");
   }
-  return std::shared_ptr<Connection>(new Connection(options));
+  const Result<ChannelSecurity> security =
+      MakeChannelSecurity(server.substr(0, colon), options.credentials);
+  if (!security) return security.error();
+  return std::shared_ptr<Connection>(new Connection(options, *security));
 }
 
 std::unique_ptr<grpc::ClientContext> Connection::Begin(Length length) {
@@ -63,7 +70,8 @@ std::unique_ptr<grpc::ClientContext> Connection::Begin(Length length) {
                          : length == Length::kLong ? options_.long_timeout
                                                    : Duration::zero();
   if (limit > Duration::zero()) context->set_deadline(After(limit));
-  context->AddMetadata("x-request-id", request_id_ + "-" + std::to_string(++calls_));
+  context->AddMetadata(kRequestIdKey, request_id_ + "-" + std::to_string(++calls_));
+  if (!authorization_.empty()) context->AddMetadata(kAuthorizationKey, authorization_);
   return context;
 }
 
@@ -75,6 +83,7 @@ Result<Clients> Connect(const ClientOptions& options) {
   clients.skills = MakeSkillClient(*connection);
   clients.executor = MakeExecutorClient(*connection);
   clients.recorder = MakeRecorderClient(*connection);
+  clients.topics = MakeTopicClient(*connection);
   return clients;
 }
 

@@ -14,6 +14,7 @@
 
 #include "call_status.hpp"
 #include "exemplar/rpc/client.hpp"
+#include "tls.hpp"
 
 namespace exemplar::rpc {
 
@@ -30,9 +31,10 @@ class Connection {
   std::unique_ptr<grpc::ClientContext> Begin(Length length = Length::kShort);
 
  private:
-  explicit Connection(const ClientOptions& options);
+  Connection(const ClientOptions& options, const ChannelSecurity& security);
   const ClientOptions options_;
   const std::string request_id_;
+  const std::string authorization_;
   const std::shared_ptr<grpc::Channel> channel_;
   std::atomic<std::uint64_t> calls_{0};
 };
@@ -89,5 +91,6 @@ std::unique_ptr<api::TrialApi> MakeTrialClient(std::shared_ptr<Connection> conne
 std::unique_ptr<api::SkillApi> MakeSkillClient(std::shared_ptr<Connection> connection);
 std::unique_ptr<api::ExecutorApi> MakeExecutorClient(std::shared_ptr<Connection> connection);
 std::unique_ptr<api::RecorderApi> MakeRecorderClient(std::shared_ptr<Connection> connection);
+std::unique_ptr<api::TopicApi> MakeTopicClient(std::shared_ptr<Connection> connection);
 
 }  // namespace exemplar::rpc

@@ -2,16 +2,19 @@
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
-#include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
 #include <fstream>
+#include <limits>
 #include <vector>
 
 #include "exemplar/base/text.hpp"
+#include "json_calls.hpp"
+#include "proxy.hpp"
 #include "server_call.hpp"
 #include "server_settings.hpp"
+#include "tls.hpp"
 
 namespace exemplar::rpc {
 namespace {
@@ -30,19 +33,18 @@ Result<std::string> HostOf(const std::string& address) {
   return address.substr(0, colon);
 }
 
-Status WritePortFile(const std::filesystem::path& file, int port) {
-  std::filesystem::path part = file;
-  part += ".part";
-  {
-    std::ofstream out(part, std::ios::trunc);
-    out << port << "\n";
-    out.flush();
-    if (!out) return InvalidArgument(part.string() + ": cannot be written", "port_file");
+/// The full names of all services, the backends' among them.
+std::vector<std::string> ServicesOf(const Services& services) {
+  std::vector<std::string> names;
+  if (services.trials) names.emplace_back("exemplar.v1.TrialService");
+  if (services.skills) names.emplace_back("exemplar.v1.SkillService");
+  if (services.executor) names.emplace_back("exemplar.v1.ExecutorService");
+  if (services.recorder) names.emplace_back("exemplar.v1.RecorderService");
+  if (services.topics) names.emplace_back("exemplar.v1.TopicService");
+  for (const Backend& backend : services.backends) {
+    names.insert(names.end(), backend.services.begin(), backend.services.end());
   }
-  std::error_code error;
-  std::filesystem::rename(part, file, error);
-  if (error) return InvalidArgument(file.string() + ": " + error.message(), "port_file");
-  return {};
+  return names;
 }
 
 class GrpcServer final : public Server {
@@ -58,25 +60,44 @@ class GrpcServer final : public Server {
     const ServerOptions& options = shared_.options();
     const Result<std::string> host = HostOf(options.listen);
     if (!host) return host.error();
+    if (const Status may = CheckListening(*host, options.credentials); !may) return may;
+    const auto credentials = MakeServerCredentials(options.credentials);
+    if (!credentials) return credentials.error();
+    if (const Status opened = shared_.guard().Open(); !opened) return opened;
+    served_ = ServicesOf(services);
     if (services.trials) services_.push_back(MakeTrialService(shared_, *services.trials));
     if (services.skills) services_.push_back(MakeSkillService(shared_, *services.skills));
     if (services.executor) services_.push_back(MakeExecutorService(shared_, *services.executor));
     if (services.recorder) services_.push_back(MakeRecorderService(shared_, *services.recorder));
+    if (services.topics) services_.push_back(MakeTopicService(shared_, *services.topics));
 
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;
     ApplySettings(builder);
     builder.SetMaxReceiveMessageSize(static_cast<int>(options.max_message_bytes));
-    builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port_);
+    builder.AddListeningPort(options.listen, *credentials, &port_);
     for (const auto& service : services_) builder.RegisterService(service.get());
+    if (!services.backends.empty()) {
+      auto proxy = Proxy::Create(shared_, services.backends);
+      if (!proxy) return proxy.error();
+      proxy_ = std::move(*proxy);
+      proxy_->AddTo(builder);
+    }
     server_ = builder.BuildAndStart();
     if (!server_ || port_ <= 0) {
       return Unavailable("cannot listen on " + options.listen +
                          ": the port is taken, or the host is none of this machine's");
     }
     address_ = *host + ":" + std::to_string(port_);
+    // The health service knows a name from its first status on; the proxy tells of its backends.
+    Services own = services;
+    own.backends.clear();
+    for (const std::string& service : ServicesOf(own)) {
+      server_->GetHealthCheckService()->SetServingStatus(service, true);
+    }
     SetServing(true);
+    if (proxy_) proxy_->Start(*server_->GetHealthCheckService());
     if (options.port_file.empty()) return {};
     return WritePortFile(options.port_file, port_);
   }
@@ -86,23 +107,58 @@ class GrpcServer final : public Server {
 
   void SetServing(bool serving) override {
     server_->GetHealthCheckService()->SetServingStatus(serving);
+    if (proxy_ && serving) proxy_->ReportHealth();
+  }
+
+  std::unique_ptr<api::JsonCalls> MakeJsonCalls() override {
+    grpc::ChannelArguments arguments;
+    arguments.SetMaxReceiveMessageSize(std::numeric_limits<int>::max());
+    return rpc::MakeJsonCalls(server_->InProcessChannel(arguments), served_);
+  }
+
+  std::vector<BackendState> backends() const override {
+    return proxy_ ? proxy_->states() : std::vector<BackendState>();
   }
 
   void Shutdown(Duration grace) override {
     shared_.shutdown().request_stop();
+    if (proxy_) proxy_->Stop();
     server_->Shutdown(std::chrono::system_clock::now() +
                       std::chrono::duration_cast<std::chrono::system_clock::duration>(grace));
   }
 
  private:
   ServerShared shared_;
+  std::vector<std::string> served_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
+  std::unique_ptr<Proxy> proxy_;  ///< outlives the server, whose calls it answers
   std::unique_ptr<grpc::Server> server_;
   int port_ = 0;
   std::string address_;
 };
 
 }  // namespace
+
+Status WritePortFile(const std::filesystem::path& file, int port) {
+  std::filesystem::path part = file;
+  part += ".part";
+  {
+    std::ofstream out(part, std::ios::trunc);
+    out << port << "\n";
+    out.flush();
+    if (!out) return InvalidArgument(part.string() + ": cannot be written", "port_file");
+  }
+  std::error_code error;
+  std::filesystem::rename(part, file, error);
+  if (error) return InvalidArgument(file.string() + ": " + error.message(), "port_file");
+  return {};
+}
+
+Status CheckListenAddress(const std::string& address,
+                          const security::ServerCredentials& credentials) {
+  const Result<std::string> host = HostOf(address);
+  return host ? CheckListening(*host, credentials) : host.error();
+}
 
 Result<std::unique_ptr<Server>> Server::Create(const ServerOptions& options, Services services) {
   auto server = std::make_unique<GrpcServer>(options);

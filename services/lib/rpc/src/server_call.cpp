@@ -5,6 +5,7 @@
 #include "call_status.hpp"
 #include "convert_common.hpp"
 #include "exemplar/base/ids.hpp"
+#include "exemplar/base/text.hpp"
 
 namespace exemplar::rpc {
 namespace {
@@ -28,31 +29,64 @@ Status Guarded(const std::function<Status()>& body) {
 
 }  // namespace
 
-ServerShared::ServerShared(const ServerOptions& options) : options_(options), rng_(EntropySeed()) {}
+ServerShared::ServerShared(const ServerOptions& options)
+    : options_(options), guard_(options_), deadlines_(options.max_call), rng_(EntropySeed()) {}
 
 std::string ServerShared::MakeRequestId() {
   const std::lock_guard lock(mutex_);
   return MakeId("request", rng_);
 }
 
+std::string WhoCalls(const grpc::ServerContext& context) {
+  const std::string request = RequestId(context);
+  return request.empty() ? "from " + context.peer() : request;
+}
+
 grpc::Status Serve(ServerShared& shared, grpc::ServerContext& context, std::string_view method,
-                   const std::function<Status()>& body) {
+                   std::string_view target, const std::function<Status()>& body) {
   const auto start = std::chrono::steady_clock::now();
-  Status status = Guarded(body);
+  const MethodRule* rule = RuleOf(method);
+  const Admission admission = shared.guard().Admit(context, method, rule);
+  const auto report = [&](const Status& status, std::string_view outcome) {
+    if (!shared.options().on_call) return;
+    std::string id = RequestId(context);
+    if (id.empty()) id = shared.MakeRequestId();
+    const std::string peer = context.peer();
+    constexpr std::size_t kLongestTarget = 128;
+    const std::string about = Utf8(target, kLongestTarget);
+    shared.options().on_call({.method = method,
+                              .request_id = id,
+                              .peer = peer,
+                              .caller = admission.caller,
+                              .target = about,
+                              .outcome = outcome,
+                              .audited = rule != nullptr && rule->audited,
+                              .status = status,
+                              .duration = std::chrono::steady_clock::now() - start});
+  };
+  if (admission.refusal) {
+    report(admission.refusal->error, admission.refusal->outcome);
+    return ToGrpc(admission.refusal->error, admission.refusal->code);
+  }
+  Status status;
+  {
+    std::optional<CallDeadlines::Watch> watch;
+    const Duration longest = shared.options().max_call;
+    if (rule->length == CallLength::kShort && longest > Duration::zero()) {
+      watch.emplace(shared.deadlines(), context);
+    }
+    status = Guarded(body);
+    if (watch && watch->fired()) {
+      status = Error{ErrorCode::kDeadlineExceeded, "the call took more than " +
+                                                       FormatDouble(ToSeconds(longest)) +
+                                                       " s, the most that this server gives it"};
+    }
+  }
   if (!status && status.error().code == ErrorCode::kCancelled &&
       shared.shutdown().stop_requested()) {
     status = Unavailable("the server is shutting down");
   }
-  if (shared.options().on_call) {
-    std::string id = RequestId(context);
-    if (id.empty()) id = shared.MakeRequestId();
-    const std::string peer = context.peer();
-    shared.options().on_call({.method = method,
-                              .request_id = id,
-                              .peer = peer,
-                              .status = status,
-                              .duration = std::chrono::steady_clock::now() - start});
-  }
+  report(status, status ? "ok" : ToString(status.error().code));
   return ToGrpc(status);
 }
 

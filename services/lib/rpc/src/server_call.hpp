@@ -19,6 +19,7 @@
 #include "exemplar/base/result.hpp"
 #include "exemplar/base/rng.hpp"
 #include "exemplar/rpc/server.hpp"
+#include "guard.hpp"
 
 namespace grpc {
 class Service;
@@ -32,18 +33,30 @@ class ServerShared {
   explicit ServerShared(const ServerOptions& options);
   const ServerOptions& options() const { return options_; }
   std::stop_source& shutdown() { return shutdown_; }
+  Guard& guard() { return guard_; }
+  CallDeadlines& deadlines() { return deadlines_; }
   std::string MakeRequestId();
 
  private:
   const ServerOptions options_;
   std::stop_source shutdown_;
+  Guard guard_;
+  CallDeadlines deadlines_;
   std::mutex mutex_;
   Rng rng_;
 };
 
-/// Runs `body`, turns what it returns (or throws) into gRPC's status, and reports the call.
+/// Runs `body` if the caller may call `method`, turns what it returns (or throws) into gRPC's
+/// status, and reports the call. `target` names what it is about, for the audit.
 grpc::Status Serve(ServerShared& shared, grpc::ServerContext& context, std::string_view method,
-                   const std::function<Status()>& body);
+                   std::string_view target, const std::function<Status()>& body);
+inline grpc::Status Serve(ServerShared& shared, grpc::ServerContext& context,
+                          std::string_view method, const std::function<Status()>& body) {
+  return Serve(shared, context, method, {}, body);
+}
+
+/// The caller as others may be told of it: its request id, or where it calls from.
+std::string WhoCalls(const grpc::ServerContext& context);
 
 /// Requests a stop when the caller cancels, goes away or runs out of time, or the server shuts
 /// down.
@@ -155,5 +168,6 @@ std::unique_ptr<grpc::Service> MakeExecutorService(ServerShared& shared,
                                                    api::ExecutorApi& executor);
 std::unique_ptr<grpc::Service> MakeRecorderService(ServerShared& shared,
                                                    api::RecorderApi& recorder);
+std::unique_ptr<grpc::Service> MakeTopicService(ServerShared& shared, api::TopicApi& topics);
 
 }  // namespace exemplar::rpc

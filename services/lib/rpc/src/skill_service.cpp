@@ -81,7 +81,7 @@ class SkillService final : public MethodTable<SkillService> {
 
   grpc::Status Rollback(grpc::ServerContext* context, const v1::RollbackSkillRequest* request,
                         v1::RollbackSkillResponse*) {
-    return Serve(shared_, *context, "exemplar.v1.SkillService/Rollback",
+    return Serve(shared_, *context, "exemplar.v1.SkillService/Rollback", request->name(),
                  [&] { return skills_.Rollback(request->name(), request->version()); });
   }
 
@@ -143,7 +143,7 @@ class SkillService final : public MethodTable<SkillService> {
 
   grpc::Status Delete(grpc::ServerContext* context, const v1::DeleteSkillRequest* request,
                       v1::DeleteSkillResponse*) {
-    return Serve(shared_, *context, "exemplar.v1.SkillService/Delete",
+    return Serve(shared_, *context, "exemplar.v1.SkillService/Delete", request->name(),
                  [&] { return skills_.Delete(request->name()); });
   }
 

@@ -39,11 +39,12 @@ class TopicService final : public v1::TopicService::Service {
 
   grpc::Status Publish(grpc::ServerContext* context, const v1::PublishSampleRequest* request,
                        v1::PublishSampleResponse*) override {
-    return Serve(shared_, *context, "exemplar.v1.TopicService/Publish", [&]() -> Status {
-      const Result<api::TopicPublication> publication = FromProto(*request);
-      if (!publication) return publication.error();
-      return topics_.Publish(*publication);
-    });
+    return Serve(shared_, *context, "exemplar.v1.TopicService/Publish", request->topic(),
+                 [&]() -> Status {
+                   const Result<api::TopicPublication> publication = FromProto(*request);
+                   if (!publication) return publication.error();
+                   return topics_.Publish(*publication);
+                 });
   }
 
  private:

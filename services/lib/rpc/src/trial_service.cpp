@@ -86,7 +86,7 @@ class TrialService final : public v1::TrialService::Service {
 
   grpc::Status Delete(grpc::ServerContext* context, const v1::DeleteTrialRequest* request,
                       v1::DeleteTrialResponse*) override {
-    return Serve(shared_, *context, "exemplar.v1.TrialService/Delete",
+    return Serve(shared_, *context, "exemplar.v1.TrialService/Delete", request->id(),
                  [&] { return trials_.Delete(request->id()); });
   }
 

@@ -14,9 +14,12 @@
 
 namespace exemplar::bus {
 
+/// Holds a few stereo pairs.
+inline constexpr std::size_t kPictureSharedMemoryBytes = std::size_t{16} << 20;
+
 struct ParticipantOptions {
   int domain = 0;                   ///< 0 to 232
-  std::string station = "default";  ///< the partition of all its topics
+  std::string station = "default";  ///< the partition of all its topics; empty: none, as others do
   std::string name = "exemplar";    ///< as discovery tools show it
   /// Addresses or names ("127.0.0.1", "eth1") of the interfaces to use; empty: all.
   std::vector<std::string> interfaces = {};
@@ -31,8 +34,10 @@ struct ParticipantOptions {
   /// taps read both.
   std::vector<std::string> best_effort_topics = {};
   /// Shared memory for neighbours on the same machine, at most this much of it (less where
-  /// /dev/shm is small); 0: UDP only. Holds a few stereo pairs.
-  std::size_t shared_memory_bytes = std::size_t{16} << 20;
+  /// /dev/shm is small); 0: UDP only. For pictures (kPictureSharedMemoryBytes), and for nothing
+  /// that must be in time: whenever a neighbour joins, Fast DDS 2.9 may hold up all that a
+  /// participant with shared memory sends for 0.33 s (its check of the newcomer's port).
+  std::size_t shared_memory_bytes = 0;
   /// Folder with cert.pem, key.pem and the rest that `exemplar security issue` makes: only
   /// participants of the same station's CA are talked to, encrypted, each on the topics that its
   /// permissions name. Empty: open. Not together with discovery_servers.

@@ -7,15 +7,32 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "exemplar/api/json_calls.hpp"
 #include "exemplar/api/services.hpp"
 #include "exemplar/api/topics.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/base/result.hpp"
 #include "exemplar/base/stamp.hpp"
+#include "exemplar/rpc/client.hpp"
 #include "exemplar/security/credentials.hpp"
 
 namespace exemplar::rpc {
+
+/// Another server, to which calls of its services are passed on.
+struct Backend {
+  std::string name;                   ///< "executor", as errors and metrics call it
+  ClientOptions connection;           ///< where it is, and how it is to be called; no time limits
+  std::vector<std::string> services;  ///< "exemplar.v1.ExecutorService"
+};
+
+struct BackendState {
+  std::string name;
+  std::string address;
+  std::vector<std::string> services;
+  bool serving = false;  ///< as its health service says; false when it does not answer
+};
 
 /// What a server serves: any subset. The objects must outlive the server.
 struct Services {
@@ -24,6 +41,9 @@ struct Services {
   api::ExecutorApi* executor = nullptr;
   api::RecorderApi* recorder = nullptr;
   api::TopicApi* topics = nullptr;
+  /// Their calls go on with deadline, cancellation and metadata, message by message; health and
+  /// reflection speak for them. Methods that are newer than this server go on as well.
+  std::vector<Backend> backends = {};
 };
 
 /// One finished call, for logs and metrics.
@@ -61,6 +81,14 @@ struct ServerOptions {
   std::function<void(const CallRecord&)> on_call = {};
 };
 
+/// Whether a server with these credentials may listen on HOST:PORT, as Server::Create decides it:
+/// for servers of other protocols beside it.
+Status CheckListenAddress(const std::string& address,
+                          const security::ServerCredentials& credentials);
+
+/// Writes the port as decimal text, whole or not at all.
+Status WritePortFile(const std::filesystem::path& file, int port);
+
 /// A running gRPC server with the health service (status of "" and of each service by its full
 /// name) and reflection. A caller who goes away, cancels or runs out of time requests the stop of
 /// the stop_token that the interface's method got. Thread-safe.
@@ -76,6 +104,11 @@ class Server {
   virtual int port() const = 0;
   /// "127.0.0.1:40001": as listened on, with the real port.
   virtual const std::string& address() const = 0;
+  /// Those of Services::backends.
+  virtual std::vector<BackendState> backends() const = 0;
+  /// Every call that is served here, as JSON; made within the process, and let in, logged and
+  /// counted as those of the network. The server outlives it.
+  virtual std::unique_ptr<api::JsonCalls> MakeJsonCalls() = 0;
   /// The health service answers NOT_SERVING from here on (or SERVING again).
   virtual void SetServing(bool serving) = 0;
   /// Refuses new calls, requests the stop of those that run, waits up to `grace` and then cuts the

@@ -1,0 +1,55 @@
+#include "exemplar/security/station_role.hpp"
+
+#include <algorithm>
+
+namespace exemplar::security {
+
+std::span<const StationRole> StationRoles() {
+  static const std::vector<StationRole> kTable = {
+      {.name = "capture",
+       .writes = {"ircp/suit", "ircp/end_effector", "ircp/tactile", "ircp/camera", "ircp/objects",
+                  "ircp/clock", "ircp/capture-*/status", "ircp/recorder/command",
+                  "ircp/simulator/command"},
+       .reads = {"ircp/joint_state", "ircp/camera", "ircp/objects", "ircp/clock",
+                 "ircp/capture-*/command", "ircp/recorder/status", "ircp/simulator/status"}},
+      {.name = "recorder", .writes = {"ircp/clock", "ircp/recorder/status"}, .reads = {"*"}},
+      {.name = "learning", .writes = {}, .reads = {}},
+      {.name = "executor",
+       .writes = {"ircp/joint_command", "ircp/plan", "ircp/clock", "ircp/executor/status"},
+       .reads = {"ircp/joint_state", "ircp/objects", "ircp/safety", "ircp/suit",
+                 "ircp/end_effector", "ircp/tactile", "ircp/clock", "ircp/executor/command"},
+       .calls = {Role::kObserve}},
+      {.name = "robot",
+       .writes = {"ircp/joint_state", "ircp/camera", "ircp/objects", "ircp/tactile", "ircp/clock",
+                  "ircp/robot/status", "ircp/simulator/status"},
+       .reads = {"ircp/joint_command", "ircp/suit", "ircp/end_effector", "ircp/clock",
+                 "ircp/robot/command", "ircp/simulator/command"}},
+      {.name = "pendant",
+       .writes = {"ircp/safety", "ircp/clock", "ircp/pendant/status"},
+       .reads = {"ircp/clock", "ircp/executor/status"}},
+      {.name = "gateway",
+       .writes = {"ircp/suit", "ircp/end_effector", "ircp/tactile", "ircp/objects", "ircp/safety",
+                  "ircp/clock", "ircp/gateway/status"},
+       .reads = {"*"},
+       .calls = {Role::kObserve},
+       .speaks_for_others = true},
+      {.name = "observer", .writes = {}, .reads = {"*"}, .calls = {Role::kObserve}},
+      {.name = "person", .writes = {}, .reads = {}},
+  };
+  return kTable;
+}
+
+const StationRole* FindStationRole(std::string_view name) {
+  const auto roles = StationRoles();
+  const auto found = std::find_if(roles.begin(), roles.end(),
+                                  [&](const StationRole& role) { return role.name == name; });
+  return found == roles.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> StationRoleNames() {
+  std::vector<std::string> names;
+  for (const StationRole& role : StationRoles()) names.emplace_back(role.name);
+  return names;
+}
+
+}  // namespace exemplar::security
