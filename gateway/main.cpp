@@ -7,6 +7,7 @@
 #include "exemplar/rpc/call_log.hpp"
 #include "exemplar/rpc/server.hpp"
 #include "gateway/control.hpp"
+#include "gateway/foxglove_side.hpp"
 #include "gateway/http_side.hpp"
 #include "gateway/known_topics.hpp"
 #include "gateway/metrics.hpp"
@@ -42,8 +43,9 @@ int main(int argc, char** argv) {
                                                .log = log.get()});
   if (!participant) return program::Fail(kName, participant.error());
 
-  auto hub = gateway::TopicHub::Create(**participant, **participant, clock,
-                                       {.publish = words.publish, .known = gateway::KnownTopics()});
+  auto hub = gateway::TopicHub::Create(
+      **participant, **participant, clock,
+      {.publish = words.publish, .known = gateway::KnownTopics(), .max_subscriptions = 4096});
   if (!hub) return program::Fail(kName, hub.error());
   gateway::TopicServer topics(**hub, {.queue = words.queue});
   rpc::CallLog calls(*log);
@@ -64,11 +66,17 @@ int main(int argc, char** argv) {
     figures.insert(figures.end(), more.begin(), more.end());
   }
   std::unique_ptr<gateway::HttpSide> http;
+  std::unique_ptr<gateway::FoxgloveSide> foxglove;
   if (!words.http.empty()) {
     auto made = gateway::HttpSide::Create(words, common, **server, *log);
     if (!made) return program::Fail(kName, made.error());
     http = std::move(*made);
+    auto drawn =
+        gateway::FoxgloveSide::Create(words, **hub, http->calls(), http->server(), clock, *log);
+    if (!drawn) return program::Fail(kName, drawn.error());
+    foxglove = std::move(*drawn);
     for (Metric& metric : http::MetricsOf(http->server())) figures.push_back(std::move(metric));
+    for (Metric& metric : foxglove->metrics()) figures.push_back(std::move(metric));
     if (const Status started = http->Start(figures); !started) {
       return program::Fail(kName, started.error());
     }

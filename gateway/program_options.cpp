@@ -19,6 +19,8 @@ void ProgramOptions::AddTo(program::Options& options) {
   options.Add("--http-port-file", http_port_file, "file that gets that port");
   options.Add("--origin", origins,
               "web pages of other origins that may use HTTP (https://app.foxglove.dev), * for all");
+  options.Add("--robot", robot, "folder of the robot's description, drawn for Foxglove");
+  options.Add("--recordings", recordings, "folder whose recordings Foxglove clients may play");
   options.Add("--publish", publish,
               "topics that clients may publish on, * for any text; default: none");
   options.Add("--queue", queue, "samples that wait for a slow client before its oldest are dropped")

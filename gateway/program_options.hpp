@@ -20,6 +20,8 @@ struct ProgramOptions {
   std::string http;            ///< HOST:PORT; empty: none
   std::string http_port_file;  ///< gets the port in use
   std::vector<std::string> origins;
+  std::string robot;       ///< folder of the robot to draw for Foxglove; empty: none
+  std::string recordings;  ///< folder whose recordings Foxglove may play; empty: none
   int queue = TopicServerOptions().queue;
 
   void AddTo(program::Options& options);

@@ -478,10 +478,12 @@ TEST_F(WebSocketTest, ClosesForBadFramesAndServesTheOthersOn) {
   };
   std::uint64_t count = 0;
   for (const std::string& bytes : bad) {
-    RawClient client(port());
-    client.Upgrade("/ws");
-    client.Send(bytes);
-    EXPECT_TRUE(client.Closed()) << count;
+    {
+      RawClient client(port());
+      client.Upgrade("/ws");
+      client.Send(bytes);
+      EXPECT_TRUE(client.Closed()) << count;
+    }
     ++count;
     EXPECT_TRUE(Eventually([&] { return Count(&Counters::bad_frames) == count; })) << count;
   }

@@ -6,6 +6,7 @@
 #include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <limits>
 #include <sstream>
 #include <stop_token>
 #include <type_traits>
@@ -112,7 +113,7 @@ class HttpConnection final : public Connection,
     decision_ = {};
     parser_.emplace();
     parser_->header_limit(static_cast<std::uint32_t>(core_.options.limits.header_bytes));
-    parser_->body_limit(boost::none);  // the route's, once it is known
+    parser_->body_limit(std::numeric_limits<std::uint64_t>::max());  // the route's comes later
     boost::beast::http::async_read_header(
         stream_, buffer_, *parser_,
         [self = this->shared_from_this()](Error error, std::size_t) { self->OnHead(error); });

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core.hpp"
+#include "exemplar/base/text.hpp"
 
 namespace exemplar::http {
 namespace {
@@ -21,15 +22,18 @@ struct Address {
 };
 
 Result<Address> ParseAddress(const std::string& text) {
+  constexpr long long kLastPort = 65535;
   const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon + 1 == text.size()) {
+  const auto port =
+      colon == std::string::npos ? std::nullopt : ParseInteger(text.substr(colon + 1));
+  if (!port || *port < 0 || *port > kLastPort) {
     return InvalidArgument("\"" + text + "\" is not HOST:PORT", "listen");
   }
   std::string host = text.substr(0, colon);
   if (host.size() >= 2 && host.front() == '[' && host.back() == ']') {
     host = host.substr(1, host.size() - 2);
   }
-  return Address{host.empty() ? "0.0.0.0" : host, text.substr(colon + 1)};
+  return Address{host.empty() ? "0.0.0.0" : host, std::to_string(*port)};
 }
 
 Status Listen(tcp::acceptor& acceptor, boost::asio::io_context& network,

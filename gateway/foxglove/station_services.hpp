@@ -1,0 +1,17 @@
+#pragma once
+// Recording and execution as services of the Foxglove protocol.
+
+#include <string>
+#include <vector>
+
+#include "exemplar/api/json_calls.hpp"
+#include "gateway/foxglove/bridge.hpp"
+
+namespace exemplar::gateway::foxglove {
+
+/// "/recorder/start", "/executor/execute", ...: calls of the gateway's as it serves them itself,
+/// under the authorization that the client's connection brought. Of a call that streams, the answer
+/// is its last message. `calls` outlives the services. docs/foxglove.md lists them.
+std::vector<Service> StationServices(api::JsonCalls& calls);
+
+}  // namespace exemplar::gateway::foxglove

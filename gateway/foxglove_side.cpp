@@ -1,0 +1,70 @@
+#include "gateway/foxglove_side.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "exemplar/bus/codec.hpp"
+#include "exemplar/kinematics/robot_description.hpp"
+#include "gateway/foxglove/bridge.hpp"
+#include "gateway/foxglove/playback.hpp"
+#include "gateway/foxglove/scene_feed.hpp"
+#include "gateway/foxglove/station_services.hpp"
+
+namespace exemplar::gateway {
+namespace {
+
+class Side final : public FoxgloveSide {
+ public:
+  Side(TopicHub& hub, api::JsonCalls& calls, http::Server& server, const Clock& clock, Log& log)
+      : server_(server),
+        bridge_(foxglove::Bridge::Create(
+            hub, clock, log, foxglove::StationServices(calls),
+            {.name = "exemplar", .session = std::to_string(clock.Now().nanoseconds())})) {}
+
+  ~Side() override { server_.Stop(); }
+
+  Status Start(const ProgramOptions& words, TopicHub& hub, const Clock& clock, Log& log) {
+    if (!words.robot.empty()) {
+      auto robot = kinematics::ReadRobotDescription(words.robot);
+      if (!robot) return robot.error();
+      robot_ = std::move(*robot);
+    }
+    auto scene = foxglove::SceneFeed::Create(hub, *bridge_, clock, log, robot_ ? &*robot_ : nullptr,
+                                             {.joint_state = bus::Decode<ircp::JointStateSample>,
+                                              .object = bus::Decode<ircp::ObjectSample>,
+                                              .plan = bus::Decode<ircp::PlanSample>},
+                                             {});
+    if (!scene) return scene.error();
+    scene_ = std::move(*scene);
+    for (const char* path : {"/", "/foxglove"}) {
+      if (Status added = server_.RouteWebSocket(path, bridge_->Endpoint()); !added) return added;
+    }
+    if (words.recordings.empty()) return {};
+    playback_ = foxglove::Playback::Create(clock, log, {.folder = words.recordings});
+    return server_.RouteWebSocket("/foxglove/recordings/{file}", playback_->Endpoint());
+  }
+
+  std::vector<Metric> metrics() const override { return foxglove::MetricsOf(*bridge_); }
+
+ private:
+  http::Server& server_;
+  std::optional<kinematics::RobotDescription> robot_;
+  std::unique_ptr<foxglove::Bridge> bridge_;
+  std::unique_ptr<foxglove::SceneFeed> scene_;
+  std::unique_ptr<foxglove::Playback> playback_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<FoxgloveSide>> FoxgloveSide::Create(const ProgramOptions& words,
+                                                           TopicHub& hub, api::JsonCalls& calls,
+                                                           http::Server& server, const Clock& clock,
+                                                           Log& log) {
+  auto side = std::make_unique<Side>(hub, calls, server, clock, log);
+  if (Status started = side->Start(words, hub, clock, log); !started) {
+    return started.error();
+  }
+  return std::unique_ptr<FoxgloveSide>(std::move(side));
+}
+
+}  // namespace exemplar::gateway
