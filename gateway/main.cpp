@@ -12,6 +12,7 @@
 #include "gateway/known_topics.hpp"
 #include "gateway/metrics.hpp"
 #include "gateway/program_options.hpp"
+#include "gateway/ros2_side.hpp"
 #include "gateway/topic_hub.hpp"
 #include "gateway/topic_server.hpp"
 
@@ -64,6 +65,13 @@ int main(int argc, char** argv) {
   std::vector<Metric> figures = rpc::MetricsOf(calls, "exemplar_gateway");
   for (const auto& more : {gateway::MetricsOf(**hub), gateway::MetricsOf(**server)}) {
     figures.insert(figures.end(), more.begin(), more.end());
+  }
+  std::unique_ptr<gateway::Ros2Side> ros2;
+  if (words.ros2) {
+    auto made = gateway::Ros2Side::Create(words, common, **participant, clock, *log);
+    if (!made) return program::Fail(kName, made.error());
+    ros2 = std::move(*made);
+    for (Metric& metric : ros2->metrics()) figures.push_back(std::move(metric));
   }
   std::unique_ptr<gateway::HttpSide> http;
   std::unique_ptr<gateway::FoxgloveSide> foxglove;

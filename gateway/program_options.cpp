@@ -19,7 +19,14 @@ void ProgramOptions::AddTo(program::Options& options) {
   options.Add("--http-port-file", http_port_file, "file that gets that port");
   options.Add("--origin", origins,
               "web pages of other origins that may use HTTP (https://app.foxglove.dev), * for all");
-  options.Add("--robot", robot, "folder of the robot's description, drawn for Foxglove");
+  options.Add("--robot", robot, "folder of the robot's description, for Foxglove and ROS 2");
+  options.Add("--ros2", ros2,
+              "be a neighbour of the ROS 2 nodes of the domain: joint states, transforms, objects, "
+              "plans (docs/ros2.md)");
+  options.Add("--ros2-rate-hz", ros2_rate_hz, "largest rate of joint states and transforms there")
+      .MinMax(1, 1000);
+  options.Add("--ros2-robot-from", ros2_robot_from,
+              "ROS 2 topic of sensor_msgs/JointState that is the station's robot");
   options.Add("--recordings", recordings, "folder whose recordings Foxglove clients may play");
   options.Add("--publish", publish,
               "topics that clients may publish on, * for any text; default: none");

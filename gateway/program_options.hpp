@@ -20,8 +20,11 @@ struct ProgramOptions {
   std::string http;            ///< HOST:PORT; empty: none
   std::string http_port_file;  ///< gets the port in use
   std::vector<std::string> origins;
-  std::string robot;       ///< folder of the robot to draw for Foxglove; empty: none
+  std::string robot;       ///< folder of the robot, for Foxglove and ROS 2; empty: none
   std::string recordings;  ///< folder whose recordings Foxglove may play; empty: none
+  bool ros2 = false;
+  double ros2_rate_hz = 100;
+  std::string ros2_robot_from;  ///< ROS 2 topic of joint states; empty: none
   int queue = TopicServerOptions().queue;
 
   void AddTo(program::Options& options);

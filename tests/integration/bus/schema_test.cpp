@@ -88,11 +88,12 @@ TEST_F(SchemaTest, AnIndependentDecoderReadsEveryType) {
   const auto status = Queue<ircp::StatusSample>(9);
   const auto safety = Queue<ircp::SafetySample>(10);
   const auto clock = Queue<ircp::ClockSample>(11);
+  const auto plan = Queue<ircp::PlanSample>(12);
   const std::vector<json> messages = Decoded();
-  ASSERT_EQ(messages.size(), 11u);
+  ASSERT_EQ(messages.size(), 12u);
   const std::vector<ircp::Header> headers = {
       suit.header,   tool.header,    tactile.header, camera.header, object.header, state.header,
-      joints.header, command.header, status.header,  safety.header, clock.header};
+      joints.header, command.header, status.header,  safety.header, clock.header,  plan.header};
   for (std::size_t i = 0; i < headers.size(); ++i) ExpectHeader(headers[i], messages[i]);
 
   // The last fields: right only if everything before was read right.
@@ -111,6 +112,7 @@ TEST_F(SchemaTest, AnIndependentDecoderReadsEveryType) {
   EXPECT_EQ(messages[8].at("values").size(), status.values.size());
   EXPECT_EQ(messages[9].at("reset"), safety.reset);
   EXPECT_EQ(messages[10].at("third_ns"), std::to_string(clock.third.nanoseconds()));
+  EXPECT_EQ(messages[11].at("tool_m"), plan.tool_m);
 }
 
 }  // namespace

@@ -11,10 +11,11 @@
 namespace exemplar::bus {
 namespace {
 
-using SampleTypes = ::testing::Types<ircp::SuitSample, ircp::EndEffectorSample, ircp::TactileSample,
-                                     ircp::CameraSample, ircp::ObjectSample, ircp::JointStateSample,
-                                     ircp::JointCommandSample, ircp::CommandSample,
-                                     ircp::StatusSample, ircp::SafetySample, ircp::ClockSample>;
+using SampleTypes =
+    ::testing::Types<ircp::SuitSample, ircp::EndEffectorSample, ircp::TactileSample,
+                     ircp::CameraSample, ircp::ObjectSample, ircp::JointStateSample,
+                     ircp::JointCommandSample, ircp::PlanSample, ircp::CommandSample,
+                     ircp::StatusSample, ircp::SafetySample, ircp::ClockSample>;
 
 template <class T>
 class CodecTest : public ::testing::Test {

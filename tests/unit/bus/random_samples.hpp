@@ -130,6 +130,17 @@ inline void Fill(Rng& rng, ircp::JointCommandSample& s) {
   s.validity = Duration(static_cast<std::int64_t>(rng.Below(1'000'000'000)));
 }
 
+inline void Fill(Rng& rng, ircp::PlanSample& s) {
+  Fill(rng, s.header);
+  s.skill = RandomText(rng);
+  const std::size_t n = rng.Below(5);
+  s.names = RandomTexts(rng, n);
+  const std::size_t times = rng.Below(5);
+  s.times_s = RandomNumbers(rng, times);
+  s.positions = RandomNumbers(rng, times * n);
+  s.tool_m = RandomNumbers(rng, times * 3);
+}
+
 inline void Fill(Rng& rng, ircp::CommandSample& s) {
   Fill(rng, s.header);
   s.program = RandomText(rng);
@@ -199,6 +210,9 @@ inline auto Members(const ircp::JointStateSample& s) {
 inline auto Members(const ircp::JointCommandSample& s) {
   return std::tuple(Members(s.header), s.names, s.positions, s.velocities, s.hand_open,
                     s.has_hand_open, s.validity);
+}
+inline auto Members(const ircp::PlanSample& s) {
+  return std::tuple(Members(s.header), s.skill, s.names, s.times_s, s.positions, s.tool_m);
 }
 inline auto Members(const ircp::CommandSample& s) {
   return std::tuple(Members(s.header), s.program, s.request_id, s.action, s.arguments, s.validity);

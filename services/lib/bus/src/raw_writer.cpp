@@ -32,6 +32,10 @@ TopicQos QosOfTopic(const ircp::RawTopic& topic) {
   qos.reliable = topic.reliable;
   qos.transient_local = topic.transient_local;
   qos.keep_all = topic.reliable && !topic.transient_local;
+  if (topic.keep_last > 0) {
+    qos.depth = topic.keep_last;
+    qos.keep_all = false;
+  }
   qos.deadline = std::chrono::duration_cast<std::chrono::milliseconds>(topic.deadline);
   return qos;
 }

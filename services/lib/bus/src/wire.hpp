@@ -17,6 +17,7 @@
 #include "ircp/joint_command.h"
 #include "ircp/joint_state.h"
 #include "ircp/objects.h"
+#include "ircp/plan.h"
 #include "ircp/safety.h"
 #include "ircp/status.h"
 #include "ircp/suit.h"
@@ -237,6 +238,29 @@ struct Wire<ircp::JointCommandSample> {
     sample.has_hand_open = message.has_hand_open();
     sample.hand_open = message.hand_open();
     sample.validity = Duration(message.validity_ns());
+  }
+};
+
+template <>
+struct Wire<ircp::PlanSample> {
+  using Message = v1::Plan;
+  static constexpr const char* kType = "Plan";
+  static constexpr const char* kIdl = "plan";
+  static constexpr const char* kLayout = "s88s[s][8][8][8]";
+
+  static void Fill(const ircp::PlanSample& sample, Message& message) {
+    message.skill(sample.skill);
+    message.names(sample.names);
+    message.times_s(sample.times_s);
+    message.positions(sample.positions);
+    message.tool_m(sample.tool_m);
+  }
+  static void Fill(Message& message, ircp::PlanSample& sample) {
+    sample.skill = std::move(message.skill());
+    sample.names = std::move(message.names());
+    sample.times_s = std::move(message.times_s());
+    sample.positions = std::move(message.positions());
+    sample.tool_m = std::move(message.tool_m());
   }
 };
 

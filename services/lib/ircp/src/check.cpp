@@ -69,6 +69,16 @@ class Checks {
     return there ? Pose(field, pose, has_orientation) : *this;
   }
 
+  /// `width` values for each of `rows`.
+  Checks& Rows(std::string_view field, const std::vector<double>& values, std::size_t rows,
+               std::size_t width) {
+    if (values.size() != rows * width) {
+      Fail(field, "has " + std::to_string(values.size()) + " values for " + std::to_string(rows) +
+                      " times of " + std::to_string(width));
+    }
+    return Finite(field, values);
+  }
+
   const Status& status() const { return status_; }
 
  private:
@@ -137,6 +147,15 @@ Status Check(const JointCommandSample& sample) {
       .Channels("names", sample.names, "positions", sample.positions)
       .Channels("names", sample.names, "velocities", sample.velocities, true)
       .Finite("hand_open", sample.hand_open)
+      .status();
+}
+
+Status Check(const PlanSample& sample) {
+  return Checks()
+      .Key("source", sample.header.source)
+      .Finite("times_s", sample.times_s)
+      .Rows("positions", sample.positions, sample.times_s.size(), sample.names.size())
+      .Rows("tool_m", sample.tool_m, sample.times_s.size(), 3)
       .status();
 }
 

@@ -59,7 +59,7 @@ class DescriptionReader {
     return RobotDescription{
         model->name,       folder_,          std::move(*model), std::move(*chain),
         std::move(*touch), std::move(*home), std::move(*servo), std::move(*allowed),
-        hand_servo};
+        hand_servo,        folder_ / *urdf};
   }
 
  private:

@@ -256,7 +256,8 @@ class RecordingPlayer final : public Player {
 bool HoldsMeasurements(const std::string& topic) {
   if (!topic.starts_with("ircp/")) return true;
   return !topic.ends_with("/command") && !topic.ends_with("/status") &&
-         topic != "ircp/joint_command" && topic != "ircp/safety" && topic != "ircp/clock";
+         topic != "ircp/joint_command" && topic != "ircp/plan" && topic != "ircp/safety" &&
+         topic != "ircp/clock";
 }
 
 Result<std::unique_ptr<Player>> Player::Create(recording::ByteSource& file,

@@ -74,6 +74,7 @@ class Bus : public TopicPort<SuitSample>,
             public TopicPort<ObjectSample>,
             public TopicPort<JointStateSample>,
             public TopicPort<JointCommandSample>,
+            public TopicPort<PlanSample>,
             public TopicPort<CommandSample>,
             public TopicPort<StatusSample>,
             public TopicPort<SafetySample>,
@@ -110,6 +111,9 @@ struct RawTopic {
   bool reliable = false;
   bool transient_local = false;
   Duration deadline{0};  ///< that the writer offers; 0: none
+  /// Of a writer: this many of the last samples are kept for readers that are behind, and nobody
+  /// waits for them; 0: all are.
+  int keep_last = 0;
 };
 
 struct RawSample {

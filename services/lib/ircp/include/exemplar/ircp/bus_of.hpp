@@ -31,6 +31,7 @@ class BusOf : public Base {
   EXEMPLAR_IRCP_PORT(ObjectSample)
   EXEMPLAR_IRCP_PORT(JointStateSample)
   EXEMPLAR_IRCP_PORT(JointCommandSample)
+  EXEMPLAR_IRCP_PORT(PlanSample)
   EXEMPLAR_IRCP_PORT(CommandSample)
   EXEMPLAR_IRCP_PORT(StatusSample)
   EXEMPLAR_IRCP_PORT(SafetySample)

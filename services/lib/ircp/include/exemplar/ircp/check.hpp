@@ -19,6 +19,7 @@ Status Check(const CameraSample& sample);
 Status Check(const ObjectSample& sample);
 Status Check(const JointStateSample& sample);
 Status Check(const JointCommandSample& sample);
+Status Check(const PlanSample& sample);
 Status Check(const CommandSample& sample);
 Status Check(const StatusSample& sample);
 Status Check(const SafetySample& sample);

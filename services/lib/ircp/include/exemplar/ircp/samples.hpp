@@ -101,6 +101,17 @@ struct JointCommandSample {
   Duration validity{0};  ///< after this long without another one the robot holds
 };
 
+/// ircp/plan: a motion that the executor has checked, for whoever draws it.
+struct PlanSample {
+  static constexpr const char* kTopic = "ircp/plan";
+  Header header;
+  std::string skill;
+  std::vector<std::string> names;
+  std::vector<double> times_s;    ///< from the start of the motion
+  std::vector<double> positions;  ///< rad or m; times x names, row by row
+  std::vector<double> tool_m;     ///< base frame; times x 3, row by row
+};
+
 /// ircp/<program>/command: control, with an answer on ircp/<program>/status.
 struct CommandSample {
   Header header;

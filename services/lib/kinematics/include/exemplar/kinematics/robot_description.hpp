@@ -48,6 +48,7 @@ struct RobotDescription {
   std::vector<ServoGains> servo;  ///< one a chain joint
   std::optional<LinkPairs> allowed_pairs = {};  ///< of the SRDF, where there is one
   ServoGains hand_servo = {};                   ///< of model.hand's joint, where there is one
+  std::filesystem::path urdf = {};              ///< the file
 };
 
 /// Errors name file, line and key.
