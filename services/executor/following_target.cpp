@@ -24,6 +24,8 @@ constexpr double kStill_m_s = 2e-3;
 /// A speed counts where it is more than so many of its standard deviations.
 constexpr double kSpeedSigmas = 4;
 
+double Stray(double sigma_m) { return kStraySigmas * sigma_m + kStray_m; }
+
 }  // namespace
 
 Eigen::Vector3d TargetTrack::StraightAt(Duration time) const {
@@ -33,9 +35,9 @@ Eigen::Vector3d TargetTrack::StraightAt(Duration time) const {
 void TargetTrack::Add(Duration time, const Eigen::Vector3d& base_p_object, double sigma_m) {
   if (!samples_.empty() && time <= samples_.back().time) return;
   const double sigma = std::max(sigma_m, kLeastSigma_m);
-  if (samples_.size() > 2) {
+  if (is_known_) {
     const double off = (base_p_object - StraightAt(time)).norm();
-    strays_ = off > kStraySigmas * sigma + kStray_m ? strays_ + 1 : 0;
+    strays_ = off > Stray(sigma) ? strays_ + 1 : 0;
   }
   samples_.push_back({time, base_p_object, sigma});
   if (strays_ >= kStrays) NoteTurn();
@@ -48,20 +50,32 @@ void TargetTrack::Add(Duration time, const Eigen::Vector3d& base_p_object, doubl
 
 void TargetTrack::NoteTurn() {
   const Eigen::Vector3d before = velocity_;
-  const Eigen::Vector3d corner = StraightAt(samples_[samples_.size() - kStrays].time);
+  const double speed = before.norm();
   while (samples_.size() > static_cast<std::size_t>(kStrays)) samples_.pop_front();
   strays_ = 0;
-  if (before.norm() < kStill_m_s || (samples_.back().base_p - corner).norm() > kLeap_m) {
-    // It was put elsewhere, or begins to move: nothing is known of it but where it is.
-    position_ = samples_.back().base_p;
-    origin_ = samples_.back().time;
+  // Had it turned back, it would be twice its way since then off the way on.
+  const Eigen::Vector3d direction = before.stableNormalized();
+  const Sample& last = samples_.back();
+  const double off_m = direction.dot(StraightAt(last.time) - last.base_p);
+  const Duration turn = last.time - FromSeconds(speed > 0 ? off_m / (2 * speed) : 0);
+  const Eigen::Vector3d corner = StraightAt(turn);
+  const bool turned =
+      speed >= kStill_m_s && off_m < kLeap_m &&
+      std::all_of(samples_.begin(), samples_.end(), [&](const Sample& sample) {
+        const Eigen::Vector3d back = corner - ToSeconds(sample.time - turn) * before;
+        return sample.time < turn || (sample.base_p - back).norm() < Stray(sample.sigma_m);
+      });
+  if (!turned) {
+    // It was put elsewhere, stops, or begins to move: nothing is known of it but where it is.
+    position_ = last.base_p;
+    origin_ = last.time;
     velocity_.setZero();
+    is_known_ = false;
     along_.setZero();
     low_.reset();
     high_.reset();
     return;
   }
-  const Eigen::Vector3d direction = before.normalized();
   if (std::abs(along_.dot(direction)) < 0.99) {
     along_ = direction;
     base_p_line_ = corner;
@@ -69,22 +83,22 @@ void TargetTrack::NoteTurn() {
     high_.reset();
   }
   (before.dot(along_) > 0 ? high_ : low_) = Along(corner);
-  // Going to and fro, it comes back as fast as it went.
   velocity_ = -before;
   position_ = corner;
-  origin_ = samples_.front().time;
+  origin_ = turn;
 }
 
 void TargetTrack::Fit() {
   const std::size_t n = samples_.size();
   const double stretch_s = ToSeconds(samples_.back().time - samples_.front().time);
   if (n < 3 || stretch_s < kLeastStretch_s) {
-    if (n < 3 && turning_points() == 0) {
+    if (!is_known_) {
       origin_ = samples_.back().time;
       position_ = samples_.back().base_p;
     }
     return;
   }
+  is_known_ = true;
   const Duration middle =
       samples_.front().time + (samples_.back().time - samples_.front().time) / 2;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();

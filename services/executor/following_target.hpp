@@ -51,7 +51,8 @@ class TargetTrack {
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< at origin_
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
   Duration origin_{0};
-  int strays_ = 0;  ///< of the last samples, that do not fit the stretch
+  bool is_known_ = false;  ///< whether it moves, and how fast
+  int strays_ = 0;         ///< of the last samples, that do not fit the stretch
   // The line it goes to and fro on, once it turned.
   Eigen::Vector3d along_ = Eigen::Vector3d::Zero();  ///< unit; zero: it never turned
   Eigen::Vector3d base_p_line_ = Eigen::Vector3d::Zero();

@@ -1,0 +1,141 @@
+"""The button on a moving cart, pressed: how many of so many presses click, by the cart's speed.
+
+Real programs (learning, executor, simulator), a fresh simulator and executor a press, the simulated time in step with
+the executor. A skill is learned from a person's presses of a button that stands; then the button runs to and fro on a
+rail, at a random place, in a random direction across the table, tracked at 60 Hz with half a millimetre of noise, and
+`skill execute --follow` presses it. A press counts when the button clicks in the simulator.
+
+    tests/system/run_isolated python3 tests/bench/moving_target.py --bin build/release/bin --presses 5
+
+Prints a line a press that went wrong, a table, and as last line one JSON object with the figures. Ends with 1 when
+fewer than nine of ten presses clicked at any speed.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "deploy" / "lib"))
+sys.path.insert(0, str(ROOT / "tests" / "bench"))
+from processes import Failure, System, wait_until  # noqa: E402
+from workspace import REGIONS, SKILL, TRIALS, Place, scene_for, write_trial  # noqa: E402
+
+SPEEDS_M_S = (0.0, 0.05, 0.1, 0.2)
+RAIL_M = 0.4
+# Where the middle of the rail is (m, base frame), and how far its direction is turned from the table's y.
+MIDDLE = ((0.45, 0.6), (-0.12, 0.02), (0.04, 0.08))
+LARGEST_TURN_RAD = 0.3
+
+
+class Cart:
+    """A button that stands upright on its rail."""
+
+    def __init__(self, rng):
+        middle = [rng.uniform(*span) for span in MIDDLE]
+        turn = rng.uniform(-LARGEST_TURN_RAD, LARGEST_TURN_RAD)
+        self.direction = [math.sin(turn), math.cos(turn), 0.0]
+        if rng.random() < 0.5:
+            self.direction = [-part for part in self.direction]
+        self.place = Place(REGIONS["arm7"], rng)
+        self.place.position = [m - RAIL_M / 2 * d for m, d in zip(middle, self.direction)]
+        self.place.rotation = (0.0, 0.0, 0.0, 1.0)
+
+    def scene(self, speed_m_s):
+        words = ", ".join(f"{part:.9g}" for part in self.direction)
+        return scene_for(self.place) + f"    rail: {{direction: [{words}], length: {RAIL_M}, speed: {speed_m_s}}}\n"
+
+
+class Bench:
+    def __init__(self, options, folder):
+        self.options, self.folder = options, folder
+        self.model = ROOT / "deploy" / "models" / "arm7"
+
+    def run(self):
+        rng = random.Random(f"{self.options.seed} trials")
+        services = System(self.options.bin, self.folder, self.options.domain, "moving")
+        try:
+            learning = services.start("learning", "--data-dir", self.folder / "learning", "--robot", self.model, server=True, bus=False)
+            self.learning = learning.address()
+            files = []
+            for number in range(TRIALS):
+                files.append(self.folder / f"trial-{number}.csv")
+                write_trial(files[-1], Place(REGIONS["arm7"], rng), self.home(), rng)
+            services.cli(self.learning, "trial", "submit", "--skill", SKILL, *files)
+            services.cli(self.learning, "skill", "learn", SKILL)
+            return {speed: [self.press(speed, number) for number in range(self.options.presses)] for speed in self.options.speeds}
+        finally:
+            services.stop()
+
+    def home(self):
+        """The tool's pose at the robot's home posture."""
+        judge = [str(self.options.bin / "workspace_judge"), "--robot", str(self.model)]
+        return json.loads(subprocess.run(judge, check=True, capture_output=True, text=True).stdout)
+
+    def press(self, speed, number):
+        rng = random.Random(f"{self.options.seed} cart {number}")
+        cart = Cart(rng)
+        folder = self.folder / f"press-{speed}-{number:03}"
+        system = System(self.options.bin, folder, self.options.domain, f"press{number}")
+        scene = folder / "scene.yaml"
+        scene.write_text(cart.scene(speed), encoding="utf-8")
+        try:
+            simulator = system.start(
+                "simulator", "--robot", self.model, "--scene", scene, "--cameras", "off", "--log-format", "json",
+                "--track-hz", 60, "--noise-object", self.options.noise_m, "--seed", number + 1,
+                "--pace", self.options.pace, "--in-step-with", "executor",
+            )
+            executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, "--clock", "network", "--log-level", "debug", server=True)
+            address = executor.address()
+            wait_until("the robot's joint state", lambda: system.cli(address, "robot", "status").get("joint_names"), 20)
+            time.sleep((2 + rng.uniform(0, self.options.watch_s)) / max(self.options.pace, 1))
+            done, detail = {}, ""
+            try:
+                done = system.cli(address, "skill", "execute", SKILL, "--follow", "--wait")
+            except Failure as failure:
+                detail = str(failure).splitlines()[-1]
+            clicks = sum('"button clicked"' in line for line in simulator.log.read_text().splitlines())
+            if clicks > 0 and done.get("state") == "done":
+                return {"outcome": "clicked", "error_m": done.get("contact_error_m")}
+            outcome = "clicked, then stopped" if clicks > 0 else "no click" if done.get("state") == "done" else "stopped"
+            print(f"{speed} m/s {number}: {outcome}: {detail or done}", file=sys.stderr, flush=True)
+            return {"outcome": outcome, "error_m": done.get("contact_error_m")}
+        finally:
+            system.stop()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
+    parser.add_argument("--speeds", type=lambda text: [float(word) for word in text.split(",")], default=list(SPEEDS_M_S), help="m/s, separated by commas")
+    parser.add_argument("--presses", type=int, default=25, help="a speed")
+    parser.add_argument("--noise-m", type=float, default=0.0005, help="standard deviation of the tracker, an axis")
+    parser.add_argument("--watch-s", type=float, default=6, help="the cart runs for two seconds and up to so many before")
+    parser.add_argument("--pace", type=float, default=1, help="simulated seconds a second")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--domain", type=int, default=94)
+    parser.add_argument("--keep", type=pathlib.Path, help="where scenes and logs go (default: nowhere)")
+    options = parser.parse_args()
+    figures = {}
+    with tempfile.TemporaryDirectory(prefix="exemplar-moving-") as folder:
+        for speed, presses in Bench(options, options.keep or pathlib.Path(folder)).run().items():
+            outcomes = [press["outcome"] for press in presses]
+            errors = [press["error_m"] for press in presses if press["error_m"] is not None]
+            figures[f"{speed:g}"] = {outcome: outcomes.count(outcome) for outcome in sorted(set(outcomes))}
+            if errors:
+                figures[f"{speed:g}"]["median_contact_error_mm"] = round(1000 * statistics.median(errors), 2)
+            print(f"{speed:g} m/s: {figures[f'{speed:g}']}", flush=True)
+    passed = all(counts.get("clicked", 0) >= 0.9 * options.presses for counts in figures.values())
+    print(json.dumps({"presses": options.presses, "seed": options.seed, "speeds_m_s": figures, "passed": passed}))
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
