@@ -75,9 +75,9 @@ TEST(Json, IsUtf8WhateverTheStringsHold) {
   const auto json =
       ToJson(*type, Cdr().Text("\xc3\xa9\xff\xed\xa0\x80\xf4\x90\x80\x80\xc3\t\x1f").bytes());
   ASSERT_TRUE(json.ok());
-  EXPECT_EQ(*json,
-            "{\"s\":\"\xc3\xa9\\ufffd\\ufffd\\ufffd\\ufffd\\ufffd\\ufffd\\ufffd\\ufffd"
-            "\\ufffd\\u0009\\u001f\"}");
+  std::string expected = "{\"s\":\"\xc3\xa9";
+  for (int i = 0; i < 9; ++i) expected += "\xef\xbf\xbd";
+  EXPECT_EQ(*json, expected + "\\u0009\\u001f\"}");
 }
 
 TEST(Json, TakesWholeNumbersAsTextAndOctetsAsNumbers) {

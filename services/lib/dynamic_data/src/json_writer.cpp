@@ -113,6 +113,7 @@ class Writer {
     if (out_ == nullptr) return;
     if (std::isnan(value)) return Put("\"NaN\"");
     if (std::isinf(value)) return Put(value > 0 ? "\"Infinity\"" : "\"-Infinity\"");
+    if (value == 0 && std::signbit(value)) return Put("-0.0");  // "-0" is read as a whole number
     std::array<char, 32> text;  // the shortest that reads back as the same number
     const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
     out_->append(text.data(), end);
@@ -126,7 +127,7 @@ class Writer {
       const std::size_t length = CharacterLength(text);
       const char c = text.front();
       if (length == 0) {
-        Put("\\ufffd");
+        Put("\xef\xbf\xbd");  // the sign for a character that cannot be read
       } else if (c == '"' || c == '\\') {
         Put('\\');
         Put(c);
