@@ -11,9 +11,9 @@ Everywhere: SI units, named at the end of a field (_s, _m, _n, _rad); poses are 
 are qx qy qz qw.
 """
 
-from ._aio import AsyncMotionStream, AsyncOperation
+from ._aio import AsyncMotionStream, AsyncOperation, AsyncSubscription
 from ._async_client import AsyncClient, AsyncSkill
-from ._calls import JointStart, Options, TrialFile
+from ._calls import Content, JointStart, Options, Sample, TrialFile
 from ._client import Client, Skill
 from ._errors import (
     AlreadyExistsError,
@@ -29,7 +29,7 @@ from ._errors import (
     UnavailableError,
 )
 from ._pose import Objects, Pose, PoseLike
-from ._sync import MotionStream, Operation
+from ._sync import MotionStream, Operation, Subscription
 from ._trial import PoseSeries, ScalarSeries, Trial
 from ._values import (
     Contact,
@@ -54,6 +54,8 @@ from ._values import (
     Suggestion,
     Suggestions,
     TopicFigures,
+    TopicInfo,
+    TopicSample,
     TrialInfo,
     TrialReport,
 )
@@ -64,10 +66,12 @@ __all__ = [
     "AsyncMotionStream",
     "AsyncOperation",
     "AsyncSkill",
+    "AsyncSubscription",
     "CancelledError",
     "Client",
     "Contact",
     "ContactReport",
+    "Content",
     "DataLossError",
     "DeadlineExceededError",
     "Evaluation",
@@ -94,6 +98,7 @@ __all__ = [
     "RecorderStatus",
     "ResourceExhaustedError",
     "RobotStatus",
+    "Sample",
     "ScalarSeries",
     "SeenObject",
     "Segmentation",
@@ -103,9 +108,12 @@ __all__ = [
     "SkillReport",
     "SkillVersion",
     "Submission",
+    "Subscription",
     "Suggestion",
     "Suggestions",
     "TopicFigures",
+    "TopicInfo",
+    "TopicSample",
     "Trial",
     "TrialFile",
     "TrialInfo",

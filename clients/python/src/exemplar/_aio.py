@@ -11,10 +11,10 @@ import grpc
 import grpc.aio
 
 from . import _calls
-from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings, closed
+from ._connection import CHANNEL_OPTIONS, Arrivals, Outcome, QueryStream, Settings, closed
 from ._errors import CancelledError, ExemplarError, from_rpc
 from ._pose import Objects, PoseLike
-from ._values import Motion
+from ._values import Motion, TopicBatch, TopicInfo, TopicSample
 from ._wire import Message, Method
 
 T = TypeVar("T")
@@ -124,6 +124,57 @@ class AsyncMotionStream:
         await self.close()
 
 
+class AsyncSubscription:
+    """Samples as they come: iterate over it. Ends with close(), at the end of an `async with` block, and with the
+    client.
+    """
+
+    def __init__(self, call: _calls.Stream[TopicBatch], stream: Any, address: str) -> None:
+        self._arrivals = Arrivals()
+        self._read = call.read
+        self._stream = stream
+        self._address = address
+        self._closed = False
+
+    @property
+    def missed(self) -> int:
+        """Samples that the gateway dropped because this client was slow."""
+        return self._arrivals.missed
+
+    @property
+    def topics(self) -> dict[str, TopicInfo]:
+        """Of which samples came, by name."""
+        return self._arrivals.topics
+
+    def __aiter__(self) -> AsyncIterator[TopicSample]:
+        return self
+
+    async def __anext__(self) -> TopicSample:
+        try:
+            with _errors_of(self._address):
+                while (sample := self._arrivals.take()) is None:
+                    message = await self._stream.read()
+                    if message is grpc.aio.EOF:
+                        raise StopAsyncIteration
+                    self._arrivals.add(self._read(message))
+        except ExemplarError:
+            if self._closed:
+                raise StopAsyncIteration from None
+            raise
+        return sample
+
+    async def close(self) -> None:
+        """Ends it."""
+        self._closed = True
+        self._stream.cancel()
+
+    async def __aenter__(self) -> AsyncSubscription:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+
 class AsyncLink:
     """Channels to the services, one an address, opened when first used. Belongs to one event loop."""
 
@@ -138,7 +189,12 @@ class AsyncLink:
         if self._closed:
             raise closed()
         if address not in self._channels:
-            self._channels[address] = grpc.aio.insecure_channel(address, options=CHANNEL_OPTIONS)
+            credentials = self.settings.credentials.channel
+            self._channels[address] = (
+                grpc.aio.secure_channel(address, credentials, options=CHANNEL_OPTIONS)
+                if credentials
+                else grpc.aio.insecure_channel(address, options=CHANNEL_OPTIONS)
+            )
         return self._channels[address]
 
     async def close(self) -> None:
@@ -168,6 +224,11 @@ class AsyncLink:
         """Begins."""
         stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
         return AsyncOperation(call, stream, self.settings.address(call.method))
+
+    def subscribe(self, call: _calls.Stream[TopicBatch], timeout: float | None = None) -> AsyncSubscription:
+        """Begins."""
+        stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
+        return AsyncSubscription(call, stream, self.settings.address(call.method))
 
     def _open(self, method: Method, request: Message, limit_s: float | None) -> Any:
         invoke = self.channel(method).unary_stream(method.path, **method.codec())

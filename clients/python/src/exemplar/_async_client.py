@@ -6,9 +6,9 @@ import os
 from collections.abc import Mapping, Sequence
 
 from . import _calls
-from ._aio import AsyncLink, AsyncMotionStream, AsyncOperation
-from ._calls import JointStart, Options, TrialFile
-from ._connection import QueryStream, Settings
+from ._aio import AsyncLink, AsyncMotionStream, AsyncOperation, AsyncSubscription
+from ._calls import Content, JointStart, Options, Sample, TrialFile
+from ._connection import Credentials, QueryStream, Settings
 from ._pose import Objects, PoseLike
 from ._trial import Trial
 from ._values import (
@@ -26,6 +26,7 @@ from ._values import (
     SkillVersion,
     Submission,
     Suggestions,
+    TopicInfo,
     TrialInfo,
 )
 
@@ -36,7 +37,9 @@ class AsyncClient:
     server: HOST:PORT that serves everything; without it, the environment variable EXEMPLAR_SERVER, then
     127.0.0.1:50051. learning, executor, recorder: addresses of single services that are elsewhere. timeout: limit of
     each call in seconds, None for none; learning, planning and executing have none. Every call takes a `timeout` of
-    its own (math.inf: none).
+    its own (math.inf: none). tls_ca: PEM file of the CA of the servers, which turns TLS on; tls_cert, tls_key: PEM files
+    of your own; token: sent with each call, "@FILE" reads a file. Without them, EXEMPLAR_TLS_CA, EXEMPLAR_TLS_CERT,
+    EXEMPLAR_TLS_KEY and EXEMPLAR_TOKEN.
 
     Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the
     first call. Belongs to one event loop. Use it as an asynchronous context manager, or await close().
@@ -50,12 +53,18 @@ class AsyncClient:
         executor: str | None = None,
         recorder: str | None = None,
         timeout: float | None = 30.0,
+        tls_ca: str | None = None,
+        tls_cert: str | None = None,
+        tls_key: str | None = None,
+        token: str | None = None,
     ) -> None:
-        self._link = AsyncLink(Settings(server, learning, executor, recorder, timeout))
+        credentials = Credentials(tls_ca, tls_cert, tls_key, token)
+        self._link = AsyncLink(Settings(server, learning, executor, recorder, timeout, credentials))
         self.trials = AsyncTrials(self._link)
         self.skills = AsyncSkills(self._link)
         self.robot = AsyncRobot(self._link)
         self.recorder = AsyncRecorder(self._link)
+        self.topics = AsyncTopics(self._link)
 
     def skill(self, name: str, version: int = 0) -> AsyncSkill:
         """One skill by name, without asking whether it is there. version: 0 for the current one."""
@@ -307,6 +316,43 @@ class AsyncRecorder:
     async def status(self, *, timeout: float | None = None) -> RecorderStatus:
         """State, file, and what was sent, received and lost on each topic."""
         return await self._link.unary(_calls.recorder("GetStatus"), timeout)
+
+
+class AsyncTopics:
+    """A station's topics, through the gateway (`server`)."""
+
+    def __init__(self, link: AsyncLink) -> None:
+        self._link = link
+
+    async def list(self, *topics: str, timeout: float | None = None) -> tuple[TopicInfo, ...]:
+        """Those that were discovered, by name; of `topics` only, in which * stands for any text."""
+        return await self._link.unary(_calls.list_topics(topics), timeout)
+
+    def subscribe(
+        self,
+        *topics: str,
+        max_rate_hz: float = 0.0,
+        queue: int = 0,
+        content: Content = "value",
+        last: bool = True,
+        timeout: float | None = None,
+    ) -> AsyncSubscription:
+        """Samples of `topics` (none: of all) as they come, those that come up later among them.
+
+        max_rate_hz: of each writer of a topic (0: all). queue: what may wait for this client; of more the oldest are
+        dropped and counted as missed (0: as the gateway has it). content: "value" for the members, "cdr" for the bytes,
+        or "both". last: begin with the last sample of each writer that keeps it. timeout: of the whole (None: none).
+        """
+        return self._link.subscribe(_calls.subscribe(topics, max_rate_hz, queue, content, last), timeout)
+
+    async def publish(
+        self, topic: str, sample: Sample, *, type: str = "", schema: str = "", timeout: float | None = None
+    ) -> None:
+        """Sends one sample: its members by name, or its bytes. `type` and `schema` where nobody has told them.
+
+        Raises FailedPreconditionError for a topic that the gateway may not write.
+        """
+        return await self._link.unary(_calls.publish(topic, sample, type, schema), timeout)
 
 
 class AsyncSkill:

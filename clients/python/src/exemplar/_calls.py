@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -33,6 +34,8 @@ from ._values import (
     SkillVersion,
     Submission,
     Suggestions,
+    TopicBatch,
+    TopicInfo,
     TrialInfo,
 )
 from ._wire import Message, Method, message_class, method
@@ -48,6 +51,14 @@ JointStart: TypeAlias = Mapping[str, float] | Sequence[float] | np.ndarray[Any, 
 
 Options: TypeAlias = Mapping[str, object]
 """Options of learning by name, as `exemplar skill learn --option` takes them."""
+
+Sample: TypeAlias = Mapping[str, object] | bytes
+"""A topic's sample to publish: its members, or its bytes with their 4-byte encapsulation header."""
+
+Content: TypeAlias = Literal["value", "cdr", "both"]
+"""What samples of a subscription carry."""
+
+_CONTENTS = {"value": "CONTENT_JSON", "cdr": "CONTENT_RAW", "both": "CONTENT_RAW_AND_JSON"}
 
 _CHUNK = 256 << 10
 
@@ -84,6 +95,15 @@ class Download:
 
     method: Method
     request: Message
+
+
+@dataclass(frozen=True)
+class Stream(Generic[P]):
+    """One request, any number of messages."""
+
+    method: Method
+    request: Message
+    read: Callable[[Message], P]
 
 
 @dataclass(frozen=True)
@@ -357,3 +377,34 @@ def recorder(name: str) -> Unary[RecorderStatus]:
 
 def mark_event(note: str, name: str, metadata: Mapping[str, str] | None) -> Unary[RecorderStatus]:
     return _unary("RecorderService/MarkEvent", _status, note=note, name=name, metadata=dict(metadata or {}))
+
+
+# ---- TopicService ----
+
+
+def _plain(value: Any) -> Any:
+    """Numpy's arrays and numbers as JSON has them."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise InvalidArgumentError(f"a {type(value).__name__} cannot be published", "sample")
+
+
+def list_topics(topics: Sequence[str]) -> Unary[tuple[TopicInfo, ...]]:
+    return _unary(
+        "TopicService/List", lambda m: tuple(_read.topic_info(x) for x in m.topics), topics=list(topics)
+    )
+
+
+def subscribe(topics: Sequence[str], max_rate_hz: float, queue: int, content: Content, last: bool) -> Stream[TopicBatch]:
+    if content not in _CONTENTS:
+        raise InvalidArgumentError(f'content is "{content}", must be one of {", ".join(_CONTENTS)}', "content")
+    found = method("TopicService/Subscribe")
+    request = found.request(
+        topics=list(topics), max_rate_hz=max_rate_hz, queue=queue, content=_CONTENTS[content], skip_last=not last
+    )
+    return Stream(found, request, _read.topic_batch)
+
+
+def publish(topic: str, sample: Sample, type_name: str, schema: str) -> Unary[None]:
+    given = {"cdr": sample} if isinstance(sample, bytes) else {"json": json.dumps(sample, default=_plain)}
+    return _unary("TopicService/Publish", _nothing, topic=topic, type=type_name, schema=schema, **given)

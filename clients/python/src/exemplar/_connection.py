@@ -5,7 +5,11 @@ from __future__ import annotations
 import itertools
 import os
 import secrets
+from collections import deque
+from pathlib import Path
 from typing import Generic, TypeVar
+
+import grpc
 
 from . import _calls, _read
 from ._errors import (
@@ -17,7 +21,7 @@ from ._errors import (
     from_detail,
 )
 from ._pose import Objects, PoseLike
-from ._values import Motion
+from ._values import Motion, TopicBatch, TopicInfo, TopicSample
 from ._wire import Message, Method, method
 
 T = TypeVar("T")
@@ -36,8 +40,50 @@ CHANNEL_OPTIONS: list[tuple[str, int]] = [
 ]
 
 
+class Credentials:
+    """Whom a client believes, and how it proves who it is. What is not given comes from the environment:
+    EXEMPLAR_TLS_CA, EXEMPLAR_TLS_CERT, EXEMPLAR_TLS_KEY, EXEMPLAR_TOKEN.
+    """
+
+    def __init__(self, tls_ca: str | None, tls_cert: str | None, tls_key: str | None, token: str | None) -> None:
+        ca = tls_ca or os.environ.get("EXEMPLAR_TLS_CA", "")
+        certificate = tls_cert or os.environ.get("EXEMPLAR_TLS_CERT", "")
+        key = tls_key or os.environ.get("EXEMPLAR_TLS_KEY", "")
+        given = token or os.environ.get("EXEMPLAR_TOKEN", "")
+        if bool(certificate) != bool(key):
+            raise InvalidArgumentError("tls_cert and tls_key must be given together", "tls_cert")
+        if certificate and not ca:
+            raise InvalidArgumentError("tls_cert needs tls_ca, the CA of the server", "tls_ca")
+        self.token = _bytes(given[1:], "token").decode().strip() if given.startswith("@") else given
+        self.channel = (
+            grpc.ssl_channel_credentials(
+                _bytes(ca, "tls_ca"),
+                _bytes(key, "tls_key") if key else None,
+                _bytes(certificate, "tls_cert") if certificate else None,
+            )
+            if ca
+            else None
+        )
+
+    def check(self, address: str) -> None:
+        """The token must not cross a network in plain text."""
+        host = address.rpartition(":")[0].strip("[]")
+        local = host in ("localhost", "::1") or host.startswith("127.")
+        if self.token and self.channel is None and not local:
+            raise FailedPreconditionError(
+                f"the token would cross the network to {host} in plain text; give tls_ca", "tls_ca"
+            )
+
+
+def _bytes(path: str, field: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidArgumentError(f"{field}: {path} cannot be read: {error.strerror}", field) from None
+
+
 class Settings:
-    """Where the services are, and how long a call may take. Thread-safe."""
+    """Where the services are, who calls, and how long a call may take. Thread-safe."""
 
     def __init__(
         self,
@@ -46,6 +92,7 @@ class Settings:
         executor: str | None,
         recorder: str | None,
         timeout: float | None,
+        credentials: Credentials,
     ) -> None:
         one = checked_address(server or os.environ.get("EXEMPLAR_SERVER") or DEFAULT_SERVER, "server")
         of_learning = checked_address(learning or one, "learning")
@@ -54,7 +101,11 @@ class Settings:
             "SkillService": of_learning,
             "ExecutorService": checked_address(executor or one, "executor"),
             "RecorderService": checked_address(recorder or one, "recorder"),
+            "TopicService": one,
         }
+        self.credentials = credentials
+        for address in self._addresses.values():
+            credentials.check(address)
         self.timeout = timeout
         _calls.limit_s(timeout, None, long=False)
         self._request_id = f"request-{secrets.token_hex(8)}"
@@ -65,8 +116,10 @@ class Settings:
         return self._addresses[of.service]
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
-        """Names a call in the services' logs."""
-        return (("x-request-id", f"{self._request_id}-{next(self._numbers)}"),)
+        """Names a call in the services' logs, and the caller."""
+        named = (("x-request-id", f"{self._request_id}-{next(self._numbers)}"),)
+        token = self.credentials.token
+        return (*named, ("authorization", f"Bearer {token}")) if token else named
 
 
 def checked_address(address: str, name: str) -> str:
@@ -114,6 +167,25 @@ class Outcome(Generic[P, T]):
             raise self._error
         assert self._result is not None
         return self._result
+
+
+class Arrivals:
+    """What has come of a subscription and was not taken yet. Not thread-safe."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[TopicSample] = deque()
+        self.missed = 0
+        self.topics: dict[str, TopicInfo] = {}
+
+    def add(self, batch: TopicBatch) -> None:
+        """Keeps it."""
+        self._waiting.extend(batch.samples)
+        self.topics.update((info.topic, info) for info in batch.topics)
+        self.missed = batch.missed
+
+    def take(self) -> TopicSample | None:
+        """The oldest."""
+        return self._waiting.popleft() if self._waiting else None
 
 
 class QueryStream:

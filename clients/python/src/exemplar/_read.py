@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from datetime import UTC, datetime
 
@@ -31,7 +32,10 @@ from ._values import (
     Submission,
     Suggestion,
     Suggestions,
+    TopicBatch,
     TopicFigures,
+    TopicInfo,
+    TopicSample,
     TrialInfo,
     TrialReport,
 )
@@ -75,6 +79,43 @@ def named_poses(poses: Iterable[Message]) -> dict[str, Pose]:
 
 def progress(m: Message) -> Progress:
     return Progress(m.fraction, m.step)
+
+
+def topic_info(m: Message) -> TopicInfo:
+    return TopicInfo(
+        m.topic,
+        m.type,
+        m.schema,
+        m.keyed,
+        m.reliable,
+        m.transient_local,
+        m.writers,
+        m.received,
+        m.lost,
+        m.rate_hz,
+        m.bytes_per_s,
+        m.subscriptions,
+        m.may_publish,
+    )
+
+
+def topic_sample(m: Message) -> TopicSample:
+    return TopicSample(
+        m.topic,
+        m.writer,
+        m.sequence,
+        m.source_stamp_ns,
+        m.received_ns,
+        json.loads(m.json) if m.json else None,
+        m.json_error,
+        m.cdr,
+    )
+
+
+def topic_batch(m: Message) -> TopicBatch:
+    return TopicBatch(
+        tuple(topic_info(x) for x in m.topics), tuple(topic_sample(x) for x in m.samples), m.missed
+    )
 
 
 def trial_info(m: Message) -> TrialInfo:

@@ -11,10 +11,10 @@ from typing import Any, Generic, TypeVar
 import grpc
 
 from . import _calls
-from ._connection import CHANNEL_OPTIONS, Outcome, QueryStream, Settings, closed
+from ._connection import CHANNEL_OPTIONS, Arrivals, Outcome, QueryStream, Settings, closed
 from ._errors import from_rpc
 from ._pose import Objects, PoseLike
-from ._values import Motion
+from ._values import Motion, TopicBatch, TopicInfo, TopicSample
 from ._wire import Message, Method
 
 T = TypeVar("T")
@@ -115,6 +115,51 @@ class MotionStream:
         self.close()
 
 
+class Subscription:
+    """Samples as they come: iterate over it. Ends with close(), at the end of a `with` block, and with the client."""
+
+    def __init__(self, call: _calls.Stream[TopicBatch], stream: Any, address: str) -> None:
+        self._arrivals = Arrivals()
+        self._read = call.read
+        self._stream = stream
+        self._address = address
+        self._closed = False
+
+    @property
+    def missed(self) -> int:
+        """Samples that the gateway dropped because this client was slow."""
+        return self._arrivals.missed
+
+    @property
+    def topics(self) -> dict[str, TopicInfo]:
+        """Of which samples came, by name."""
+        return self._arrivals.topics
+
+    def __iter__(self) -> Iterator[TopicSample]:
+        return self
+
+    def __next__(self) -> TopicSample:
+        try:
+            while (sample := self._arrivals.take()) is None:
+                self._arrivals.add(self._read(next(self._stream)))
+        except grpc.RpcError as error:
+            if self._closed:
+                raise StopIteration from None
+            raise from_rpc(error, self._address) from None
+        return sample
+
+    def close(self) -> None:
+        """Ends it, from any thread."""
+        self._closed = True
+        self._stream.cancel()
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
 class Link:
     """Channels to the services, one an address, opened when first used. Thread-safe."""
 
@@ -131,7 +176,12 @@ class Link:
             if self._closed:
                 raise closed()
             if address not in self._channels:
-                self._channels[address] = grpc.insecure_channel(address, options=CHANNEL_OPTIONS)
+                credentials = self.settings.credentials.channel
+                self._channels[address] = (
+                    grpc.secure_channel(address, credentials, options=CHANNEL_OPTIONS)
+                    if credentials
+                    else grpc.insecure_channel(address, options=CHANNEL_OPTIONS)
+                )
             return self._channels[address]
 
     def close(self) -> None:
@@ -162,6 +212,11 @@ class Link:
         """Begins."""
         stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
         return Operation(call, stream, self.settings.address(call.method))
+
+    def subscribe(self, call: _calls.Stream[TopicBatch], timeout: float | None = None) -> Subscription:
+        """Begins."""
+        stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
+        return Subscription(call, stream, self.settings.address(call.method))
 
     def _open(self, method: Method, request: Message, limit_s: float | None) -> Any:
         invoke = self.channel(method).unary_stream(method.path, **method.codec())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,54 @@ class Progress:
 
     fraction: float
     step: str
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """A topic of the station as the gateway sees it; counts since the gateway started, rates over the last second.
+
+    `type` is its name on the network, `schema` its IDL ("" where no writer brought one).
+    """
+
+    topic: str
+    type: str
+    schema: str
+    keyed: bool
+    reliable: bool
+    transient_local: bool
+    writers: int
+    received: int
+    lost: int
+    rate_hz: float
+    bytes_per_s: float
+    subscriptions: int
+    may_publish: bool
+
+
+@dataclass(frozen=True)
+class TopicSample:
+    """One sample. Stamps are nanoseconds since the Unix epoch: as the writer's middleware stamped it, and as the
+    gateway received it. `value` holds the members where they were asked for and could be read; `error` says why not.
+    `cdr` begins with the 4-byte encapsulation header.
+    """
+
+    topic: str
+    writer: str
+    sequence: int
+    source_stamp_ns: int
+    received_ns: int
+    value: dict[str, Any] | None
+    error: str
+    cdr: bytes
+
+
+@dataclass(frozen=True)
+class TopicBatch:
+    """What came since the last one. `missed`: samples dropped since the beginning because this client was slow."""
+
+    topics: tuple[TopicInfo, ...]
+    samples: tuple[TopicSample, ...]
+    missed: int
 
 
 @dataclass(frozen=True)
