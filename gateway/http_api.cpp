@@ -62,32 +62,44 @@ Result<api::JsonCall> CallOf(const HttpApi& api, const std::string& method,
   return call;
 }
 
-void Serve(const HttpApi& api, const std::string& method, bool lines, const http::Request& request,
-           http::Stream& stream) {
+/// A call that answers once.
+http::Response Ask(const HttpApi& api, const std::string& method, const http::Request& request) {
   const Result<api::JsonCall> call = CallOf(api, method, request);
-  const auto answer = [&stream](const http::Response& response) {
+  if (!call) return http::ErrorAnswer(call.error());
+  const std::string& id = call->metadata.back().second;
+  std::string body;
+  const std::optional<api::JsonFailure> failure = api.calls->Call(*call, [&](std::string&& json) {
+    body = std::move(json);
+    return true;
+  });
+  if (failure) return FailureAnswer(*failure, id);
+  return {200, {{"Content-Type", kJson}, {kRequestId, id}}, body + "\n"};
+}
+
+/// A call that answers with a stream: a line each.
+void Listen(const HttpApi& api, const std::string& method, const http::Request& request,
+            http::Stream& stream) {
+  const auto refuse = [&stream](const http::Response& response) {
     stream.Begin(response.status, response.headers);
     stream.Write(response.body);
   };
-  if (!call) return answer(http::ErrorAnswer(call.error()));
+  const Result<api::JsonCall> call = CallOf(api, method, request);
+  if (!call) return refuse(http::ErrorAnswer(call.error()));
   const std::string& id = call->metadata.back().second;
   bool begun = false;
+  const auto begin = [&] {
+    if (!begun) stream.Begin(200, {{"Content-Type", kJsonLines}, {kRequestId, id}});
+    begun = true;
+  };
   const std::optional<api::JsonFailure> failure = api.calls->Call(*call, [&](std::string&& json) {
-    if (!begun) {
-      stream.Begin(200, {{"Content-Type", lines ? kJsonLines : kJson}, {kRequestId, id}});
-      begun = true;
-    }
+    begin();
     json += '\n';
     return stream.Write(json);
   });
-  if (!failure) {
-    if (!begun) stream.Begin(200, {{"Content-Type", kJsonLines}, {kRequestId, id}});
-  } else if (!begun) {
-    answer(FailureAnswer(*failure, id));
-  } else {
-    // The status has gone out already: the last line says it.
-    stream.Write(ToText({{"error", ErrorObject(*failure)}}) + "\n");
-  }
+  if (failure && !begun) return refuse(FailureAnswer(*failure, id));
+  begin();
+  // The status has gone out already: the last line says it.
+  if (failure) stream.Write(ToText({{"error", ErrorObject(*failure)}}) + "\n");
 }
 
 http::Response HealthAnswer(const HttpApi& api) {
@@ -101,25 +113,22 @@ http::Response HealthAnswer(const HttpApi& api) {
   return http::Answer(ToText(health) + "\n", kJson);
 }
 
-Status AddCalls(http::Server& server, const HttpApi& api) {
-  for (const api::JsonMethod& method : api.calls->methods()) {
-    const std::string name = method.service + "/" + method.name;
-    const http::RouteOptions options{.body_bytes = method.client_streaming ? api.stream_body_bytes
-                                                                           : api.body_bytes};
-    const auto serve = [api, name, lines = method.server_streaming](const http::Request& request,
-                                                                    http::Stream& stream) {
-      Serve(api, name, lines, request, stream);
-    };
-    if (Status added = server.RouteStream(http::Method::kPost, "/" + name, serve, options);
-        !added) {
-      return added;
-    }
-    if (!method.read_only || method.client_streaming) continue;
-    if (Status added = server.RouteStream(http::Method::kGet, "/" + name, serve, options); !added) {
-      return added;
-    }
+Status AddCall(http::Server& server, const HttpApi& api, const api::JsonMethod& method,
+               http::Method verb) {
+  const std::string name = method.service + "/" + method.name;
+  const http::RouteOptions options{.body_bytes = method.client_streaming ? api.stream_body_bytes
+                                                                         : api.body_bytes};
+  if (!method.server_streaming) {
+    return server.Route(
+        verb, "/" + name,
+        [api, name](const http::Request& request) { return Ask(api, name, request); }, options);
   }
-  return {};
+  return server.RouteStream(
+      verb, "/" + name,
+      [api, name](const http::Request& request, http::Stream& stream) {
+        Listen(api, name, request, stream);
+      },
+      options);
 }
 
 }  // namespace
@@ -137,8 +146,12 @@ Status AddRoutes(http::Server& server, const HttpApi& api) {
                        [document = api.calls->OpenApi()](const http::Request&) {
                          return http::Answer(document, kJson);
                        });
-  if (!added) return added;
-  return AddCalls(server, api);
+  for (const api::JsonMethod& method : api.calls->methods()) {
+    if (added) added = AddCall(server, api, method, http::Method::kPost);
+    const bool may_get = method.read_only && !method.client_streaming;
+    if (added && may_get) added = AddCall(server, api, method, http::Method::kGet);
+  }
+  return added;
 }
 
 }  // namespace exemplar::gateway

@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,13 +17,13 @@ class Failure(Exception):
 class Process:
     """A program of Exemplar in the background; its log goes to a file."""
 
-    def __init__(self, binary, arguments, log, needs_port=False):
+    def __init__(self, binary, arguments, log, needs_port=False, port=0):
         self.name = binary.name
         self.log = log
         self.port_file = log.with_suffix(".port") if needs_port else None
         if self.port_file:
             self.port_file.unlink(missing_ok=True)
-            arguments = [*arguments, "--listen", "127.0.0.1:0", "--port-file", str(self.port_file)]
+            arguments = [*arguments, "--listen", f"127.0.0.1:{port}", "--port-file", str(self.port_file)]
         self._stderr = open(log, "ab")
         self._process = subprocess.Popen(
             [str(binary), *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=self._stderr, stderr=self._stderr
@@ -82,10 +83,10 @@ class System:
         self.bus = ["--domain", str(domain), "--station", station]
         self.processes = []
 
-    def start(self, program, *arguments, server=False, bus=True):
+    def start(self, program, *arguments, server=False, port=0, bus=True):
         if bus:
             arguments = (*self.bus, *arguments)
-        process = Process(self.binaries / f"exemplar-{program}", arguments, self.logs / f"{program}.log", server)
+        process = Process(self.binaries / f"exemplar-{program}", arguments, self.logs / f"{program}.log", server, port)
         self.processes.append(process)
         return process
 
@@ -113,6 +114,13 @@ class System:
                 unclean.append(process.name)
         self.processes.clear()
         return unclean
+
+
+def free_port():
+    """A port that nobody listens on now, for a program that others must know before it runs."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 def wait_until(what, condition, timeout_s, interval_s=0.1):

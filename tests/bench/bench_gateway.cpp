@@ -84,7 +84,7 @@ int Publish(bus::Participant& participant, double seconds, double rate_hz) {
   const Duration end = tick + FromSeconds(seconds);
   while (tick < end) {
     tick += kTick;
-    clock.SleepUntil(tick);
+    clock.SleepUntil(tick, {});
     latest = std::max(latest, clock.Steady() - tick);
     for (due += each_tick; due >= 1; --due) {
       const std::uint64_t seq = 1 + sent / writers.size();

@@ -23,9 +23,9 @@ BINARIES = pathlib.Path(os.environ.get("EXEMPLAR_BIN", ROOT / "build" / "release
 ROBOT = ROOT / "deploy" / "models" / "arm7"
 RAIL = ROOT / "deploy" / "config" / "rail_press.yaml"
 TABLE = ROOT / "deploy" / "config" / "press_table.yaml"
-PROGRAMS = ["capture-suit", "capture-tactile", "capture-vision", "executor", "learning", "recorder", "simulator"]
+PROGRAMS = ["capture-suit", "capture-tactile", "capture-vision", "executor", "gateway", "learning", "recorder", "simulator"]
 WITH_DDS = [name for name in PROGRAMS if name != "learning"]
-SERVERS = ["executor", "learning", "recorder"]
+SERVERS = ["executor", "gateway", "learning", "recorder"]
 LOG_LINE = re.compile(r"^\d{4}-\d\d-\d\dT\S+Z (debug|info|warning|error) [a-z-]+: .+$")
 
 
@@ -156,6 +156,8 @@ class UsageTest(unittest.TestCase):
             (["capture-suit", "--person"], 2, "--robot"),
             (["executor", "--robot", absent, "--scene", RAIL, "--learning", "127.0.0.1:1"], 3, "absent"),
             (["executor", "--robot", ROBOT, "--scene", RAIL, "--learning", "nowhere"], 4, "nowhere"),
+            (["gateway", "--learning", "nowhere"], 4, "nowhere"),
+            (["gateway", "--http", "nowhere"], 4, "nowhere"),
             (["recorder", "--config", absent, "--data-dir", self.folder], 2, "absent"),
         ]
         for words, code, named in cases:
@@ -189,6 +191,7 @@ class RunningTest(unittest.TestCase):
         configs = {
             "recorder": {"data-dir": cls.folder / "recordings"},
             "executor": {"robot": ROBOT, "scene": RAIL, "learning": f"127.0.0.1:{learning.port()}"},
+            "gateway": {"learning": f"127.0.0.1:{learning.port()}", "http": "127.0.0.1:0"},
             "simulator": {"robot": ROBOT, "scene": RAIL, "cameras": "off"},
             "capture-tactile": {"from-robot": "true", "rate-hz": 60},
             "capture-vision": {"scene": TABLE},
@@ -217,6 +220,7 @@ class RunningTest(unittest.TestCase):
         wanted = {
             "learning": "exemplar_learning_calls_total",
             "recorder": "exemplar_recorder_recording",
+            "gateway": "exemplar_gateway_samples_total",
             "executor": 'exemplar_executor_state{state="idle"}',
             "simulator": 'exemplar_simulator_sent_total{topic="ircp/joint_state",source="robot"}',
             "capture-tactile": 'exemplar_capture_tactile_sent_total{topic="ircp/tactile",source="tactile"}',
