@@ -153,7 +153,7 @@ const SCRIPT = {
     Subscribe: {
       send: { topics: ["ircp/joint_state"], content: "CONTENT_JSON" },
       take: 2,
-      check: (parts) => assert.ok(parts.some((part) => part.samples.some((one) => JSON.parse(one.json).position))),
+      check: (parts) => assert.ok(parts.some((part) => part.samples.some((one) => JSON.parse(one.json).positions))),
     },
     // The gateway was allowed none.
     Publish: { send: { topic: "ircp/safety", json: "{}" }, may: [PRECONDITION, grpc.status.PERMISSION_DENIED] },

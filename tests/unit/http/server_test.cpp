@@ -444,6 +444,7 @@ TEST_F(WebSocketTest, CarriesTextAndBinaryMessages) {
   EXPECT_EQ(Socket(0)->subprotocol(), "b.v1");
   client.SendFrame(0x88, "\x03\xe8");
   EXPECT_EQ(client.ReadFrame().first, 0x88);
+  client.SendNoMore();
   EXPECT_TRUE(Eventually([&] { return closed_ == 1; }));
   EXPECT_FALSE(Socket(0)->SendText("late").open);
 }
@@ -532,7 +533,9 @@ TEST_F(WebSocketTest, DropsTheOldestForAClientThatReadsNothingAndCountsIt) {
 TEST_F(WebSocketTest, ClosesAClientThatIsTooFarBehindForWhatMustNotBeDropped) {
   WebSocketEndpoint endpoint;
   endpoint.firm_bytes = 100'000;
-  MakeEcho({}, std::move(endpoint));
+  ServerOptions options;
+  options.limits.request_timeout = milliseconds(500);  // for the answer to the close as well
+  MakeEcho(std::move(options), std::move(endpoint));
   RawClient stalled(port(), 4096);
   stalled.Upgrade("/ws");
   const auto socket = Socket(0);
@@ -566,7 +569,9 @@ TEST_F(WebSocketTest, BoundsTheClientsOfAnEndpoint) {
 }
 
 TEST_F(WebSocketTest, SaysGoodbyeWhenTheServerStopsAndOutlivesIt) {
-  MakeEcho();
+  ServerOptions options;
+  options.grace = milliseconds(200);
+  MakeEcho(std::move(options));
   RawClient client(port());
   client.Upgrade("/ws");
   const auto socket = Socket(0);

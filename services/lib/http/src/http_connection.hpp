@@ -286,7 +286,7 @@ class HttpConnection final : public Connection,
     }
     serving_ = true;
     leaving_ = true;
-    patience_.expires_after(std::chrono::seconds(1));
+    patience_.expires_after(std::chrono::milliseconds(core_.stopping ? 100 : 1000));
     patience_.async_wait([self = this->shared_from_this()](Error error) {
       if (!error) self->Cut();
     });
