@@ -39,6 +39,18 @@ int main(int argc, char** argv) {
       .MinMax(0, 1000);
   options.Add("--in-step-with", settings.in_step_with,
               "programs that run with --clock network: the simulated time waits for them");
+  double stand_after_s = 0;
+  options
+      .Add("--stand-after-s", stand_after_s,
+           "in step: time stands still once nobody has commanded the robot for so long, until "
+           "somebody does; 0: it goes on")
+      .MinMax(0, 1e6);
+  double epoch_s = 0;
+  options
+      .Add("--epoch-s", epoch_s,
+           "in step: what the wall clock says at the beginning, in seconds since 1970; 0: as the "
+           "machine's")
+      .MinMax(0, 4e9);
   double command_delay_ms = 0;
   options.Add("--command-delay-ms", command_delay_ms, "until the servos hear of a command")
       .MinMax(0, 1000);
@@ -60,6 +72,8 @@ int main(int argc, char** argv) {
   settings.leader = follow == "suit" ? simulator::Leader::kSuit : simulator::Leader::kCommand;
   settings.cameras = cameras == "on";
   settings.world.step = FromSeconds(1e-3 * step_ms);
+  if (epoch_s > 0) settings.epoch = Stamp() + FromSeconds(epoch_s);
+  settings.stand_after = FromSeconds(stand_after_s);
   settings.command_delay = FromSeconds(1e-3 * command_delay_ms);
   settings.noise.seed = static_cast<std::uint64_t>(seed);
 
@@ -67,17 +81,27 @@ int main(int argc, char** argv) {
   if (!robot) return program::Fail(kName, robot.error());
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene) return program::Fail(kName, scene.error());
-  auto participant =
-      bus::Participant::Create({.domain = options.common().domain,
-                                .station = options.common().station,
-                                .name = kName,
-                                .interfaces = options.common().interfaces,
-                                .peers = options.common().peers,
-                                .discovery_servers = options.common().discovery_servers,
-                                .best_effort_topics = options.common().best_effort,
-                                .clock = &clock,
-                                .log = log.get()});
+  bus::ParticipantOptions network{.domain = options.common().domain,
+                                  .station = options.common().station,
+                                  .name = kName,
+                                  .interfaces = options.common().interfaces,
+                                  .peers = options.common().peers,
+                                  .discovery_servers = options.common().discovery_servers,
+                                  .best_effort_topics = options.common().best_effort,
+                                  .security = options.common().security,
+                                  .clock = &clock,
+                                  .log = log.get()};
+  auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
+  std::unique_ptr<bus::Participant> pictures;
+  if (settings.cameras && !scene->cameras.empty()) {
+    network.name += " pictures";
+    network.shared_memory_bytes = bus::kPictureSharedMemoryBytes;
+    auto made = bus::Participant::Create(network);
+    if (!made) return program::Fail(kName, made.error());
+    pictures = std::move(*made);
+    settings.picture_bus = pictures.get();
+  }
   auto session = simulator::Session::Create(**participant, clock, *log, *robot, *scene, settings);
   if (!session) return program::Fail(kName, session.error());
   const auto metrics = program::ServeMetrics(options.common(), simulator::MetricsOf(**session));

@@ -32,8 +32,14 @@ class Outbox {
       }
       waiting_.push_back(std::move(value));
     }
-    changed_.notify_one();
+    changed_.notify_all();
     return true;
+  }
+
+  /// Returns when what was put so far has been delivered.
+  void Flush() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return waiting_.empty() && !delivering_; });
   }
 
   /// Delivers what is left and ends the thread; what is put afterwards stays.
@@ -55,9 +61,12 @@ class Outbox {
       if (waiting_.empty()) return;
       Value value = std::move(waiting_.front());
       waiting_.pop_front();
+      delivering_ = true;
       lock.unlock();
       deliver_(std::move(value));
       lock.lock();
+      delivering_ = false;
+      if (waiting_.empty()) changed_.notify_all();
     }
   }
 
@@ -66,6 +75,7 @@ class Outbox {
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Value> waiting_;
+  bool delivering_ = false;
   std::uint64_t dropped_ = 0;
   std::jthread thread_;  ///< last: stops before the rest goes
 };

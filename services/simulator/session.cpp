@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <deque>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
@@ -11,10 +13,12 @@
 
 #include "exemplar/base/rng.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/ircp/clock_watch.hpp"
 #include "exemplar/ircp/control.hpp"
 #include "exemplar/ircp/simulated_time.hpp"
 #include "simulator/cameras.hpp"
 #include "simulator/outbox.hpp"
+#include "simulator/placing.hpp"
 
 namespace exemplar::simulator {
 namespace {
@@ -23,12 +27,10 @@ constexpr const char* kProgram = "simulator";
 /// Behind by more than this, the world lets time pass rather than rush after it.
 constexpr Duration kLargestLag = std::chrono::milliseconds(200);
 constexpr std::size_t kStatesWaiting = 256;
-/// The source of tracked objects.
-constexpr const char* kTracker = "tracker";
 constexpr std::size_t kObjectsWaiting = 256;
-/// Beyond this a place is a slip of the hand, and bad for the physics.
-constexpr double kFarthest_m = 100;
 constexpr std::size_t kSamplesWaiting = 64;
+/// Of real time, between two sayings of a time that stands.
+constexpr Duration kSayAgain = std::chrono::milliseconds(50);
 
 /// A sample for the robot's joints, as it came.
 struct Arrival {
@@ -67,55 +69,6 @@ const char* NameOf(Follower::Mode mode) {
   return "holding";
 }
 
-std::string PoseText(const geometry::Pose& pose) {
-  const Eigen::Vector3d& p = pose.translation;
-  const Eigen::Quaterniond& q = pose.rotation;
-  std::vector<std::string> numbers;
-  for (const double v : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) {
-    numbers.push_back(FormatDouble(v));
-  }
-  return Join(numbers, ",");
-}
-
-/// `pose` with what `arguments` say of it.
-Result<geometry::Pose> ReadPose(const std::map<std::string, std::string>& arguments,
-                                geometry::Pose pose) {
-  const auto read = [&](const std::string& key, double& value) -> Status {
-    const auto it = arguments.find(key);
-    if (it == arguments.end()) return {};
-    const std::optional<double> number = ParseDouble(it->second);
-    if (!number || !std::isfinite(*number)) {
-      return InvalidArgument(key + ": \"" + it->second + "\" is not a finite number", key);
-    }
-    if (std::abs(*number) > kFarthest_m) {
-      return InvalidArgument(key + " is " + it->second + ", must be within " +
-                                 FormatDouble(kFarthest_m) + " m of the robot's base",
-                             key);
-    }
-    value = *number;
-    return {};
-  };
-  const char* position_keys[] = {"x", "y", "z"};
-  for (int i = 0; i < 3; ++i) {
-    if (Status status = read(position_keys[i], pose.translation[i]); !status) return status.error();
-  }
-  const char* rotation_keys[] = {"qx", "qy", "qz", "qw"};
-  const bool has_rotation = std::any_of(std::begin(rotation_keys), std::end(rotation_keys),
-                                        [&](const char* key) { return arguments.contains(key); });
-  if (!has_rotation) return pose;
-  Eigen::Vector4d rotation = Eigen::Vector4d::Zero();  // x y z w
-  for (int i = 0; i < 4; ++i) {
-    if (Status status = read(rotation_keys[i], rotation[i]); !status) return status.error();
-  }
-  if (std::abs(rotation.norm() - 1) > 0.01) {
-    return InvalidArgument(
-        "qx, qy, qz, qw: norm is " + FormatFixed(rotation.norm(), 4) + ", must be 1", "qw");
-  }
-  pose.rotation = Eigen::Quaterniond(rotation[3], rotation[0], rotation[1], rotation[2]);
-  pose.rotation.normalize();
-  return pose;
-}
-
 class RunningSession final : public Session {
  public:
   RunningSession(const Clock& clock, Log& log, const kinematics::RobotDescription& robot,
@@ -134,7 +87,7 @@ class RunningSession final : public Session {
 
   Status Connect(ircp::Bus& bus, const scene::Description& scene) {
     if (options_.track_hz > 0) {
-      auto objects = bus.MakeWriter<ircp::ObjectSample>(kTracker);
+      auto objects = bus.MakeWriter<ircp::ObjectSample>(ircp::kTrackerSource);
       if (!objects) return objects.error();
       object_writer_ = std::move(objects).value();
       tracked_ = std::make_unique<Outbox<ircp::ObjectSample>>(
@@ -145,8 +98,14 @@ class RunningSession final : public Session {
           });
     }
     if (options_.cameras && !scene.cameras.empty()) {
+      ircp::Bus& pictures = options_.picture_bus ? *options_.picture_bus : bus;
+      if (options_.picture_bus) {
+        auto clock = ircp::ClockResponder::Create(pictures, clock_, kProgram);
+        if (!clock) return clock.error();
+        picture_clock_ = std::move(*clock);
+      }
       Result<std::unique_ptr<Cameras>> cameras = Cameras::Create(
-          bus, log_, world_, scene,
+          pictures, log_, world_, scene,
           {.encoding = options_.picture_encoding, .quality = options_.picture_quality});
       if (cameras) {
         cameras_ = std::move(cameras).value();
@@ -156,7 +115,7 @@ class RunningSession final : public Session {
         return cameras.error();
       }
     }
-    auto writer = bus.MakeWriter<ircp::JointStateSample>("robot");
+    auto writer = bus.MakeWriter<ircp::JointStateSample>(ircp::kRobotSource);
     if (!writer) return writer.error();
     state_writer_ = std::move(writer).value();
     states_ = std::make_unique<Outbox<Outgoing>>(
@@ -246,17 +205,37 @@ class RunningSession final : public Session {
     }
   }
 
+  /// Where time is to stand while nobody commands the robot: until a command has come and its
+  /// sender is in step again. False: `stop` came first.
+  bool StandUntilCommanded(const std::function<bool()>& lead, const std::stop_token& stop) {
+    if (options_.stand_after == Duration(0)) return true;
+    if (world_.time() - last_arrival_ < options_.stand_after) return true;
+    std::unique_lock lock(inbox_mutex_);
+    while (!arrived_.wait_for(lock, stop, kSayAgain, [this] { return !inbox_.empty(); })) {
+      lock.unlock();
+      if (!lead()) return false;  // who came later hears the time as well
+      lock.lock();
+    }
+    lock.unlock();
+    return lead();
+  }
+
   /// A beat is the period of the robot's state: others see no time between.
   void RunInStep(const std::stop_token& stop) {
-    const Stamp epoch = clock_.Now() - world_.time();
+    const Stamp epoch = options_.epoch.value_or(clock_.Now()) - world_.time();
     const Duration begin = clock_.Steady();
     const auto taken = [this](const std::string& program) {
       const std::lock_guard lock(inbox_mutex_);
       const auto it = last_seq_.find(program);
       return it == last_seq_.end() ? 0 : it->second;
     };
-    for (double beats = 1; time_->Lead(world_.time(), epoch + world_.time(), taken, stop);
-         ++beats) {
+    const auto lead = [&] {
+      states_->Flush();
+      const ircp::SentInputs sent{state_writer_->sent(), tracked_ ? object_writer_->sent() : 0};
+      return time_->Lead(world_.time(), epoch + world_.time(), sent, taken, stop);
+    };
+    for (double beats = 1; lead(); ++beats) {
+      if (!StandUntilCommanded(lead, stop)) return;
       for (const std::string& program : time_->TakeLost()) {
         log_.Warning("time goes on without a program that is silent", {{"program", program}});
       }
@@ -298,9 +277,9 @@ class RunningSession final : public Session {
   std::vector<ircp::TopicCount> sent() const override {
     std::vector<ircp::TopicCount> counts;
     if (cameras_) counts = cameras_->sent();
-    counts.push_back({ircp::JointStateSample::kTopic, "robot", state_writer_->sent()});
+    counts.push_back({ircp::JointStateSample::kTopic, ircp::kRobotSource, state_writer_->sent()});
     if (object_writer_) {
-      counts.push_back({ircp::ObjectSample::kTopic, kTracker, object_writer_->sent()});
+      counts.push_back({ircp::ObjectSample::kTopic, ircp::kTrackerSource, object_writer_->sent()});
     }
     return counts;
   }
@@ -323,13 +302,14 @@ class RunningSession final : public Session {
     world_.Step();
     SayClicks();
     const Stamp stamp = epoch + world_.time();
-    if (ToSeconds(world_.time()) * options_.rate_hz >= static_cast<double>(states_due_)) {
-      ++states_due_;
-      states_->Put({State(stamp), follower_.mode()});
-    }
     if (tracked_ && ToSeconds(world_.time()) * options_.track_hz >= static_cast<double>(looks_)) {
       ++looks_;
       Track(stamp);
+      if (time_) tracked_->Flush();  // the state that follows finds them
+    }
+    if (ToSeconds(world_.time()) * options_.rate_hz >= static_cast<double>(states_due_)) {
+      ++states_due_;
+      states_->Put({State(stamp), follower_.mode()});
     }
     if (cameras_) cameras_->Look(world_, stamp);
   }
@@ -362,6 +342,7 @@ class RunningSession final : public Session {
       const std::lock_guard lock(inbox_mutex_);
       arrivals.swap(inbox_);
     }
+    if (!arrivals.empty()) last_arrival_ = world_.time();
     for (Arrival& arrival : arrivals) {
       on_the_way_.emplace_back(world_.time() + options_.command_delay, std::move(arrival));
     }
@@ -461,6 +442,7 @@ class RunningSession final : public Session {
       last_seq_[arrival.header.source] = arrival.header.seq;
       inbox_.push_back(std::move(arrival));
     }
+    arrived_.notify_one();
     if (is_leading_.load()) time_->Recheck();
   }
 
@@ -534,16 +516,19 @@ class RunningSession final : public Session {
   std::deque<std::pair<Duration, Arrival>> on_the_way_;  ///< by when the servos hear of it
   std::vector<std::uint64_t> clicks_;                    ///< said so far, by button
   double hand_open_ = 1;
+  Duration last_arrival_{0};  ///< of a sample that the robot follows, by the world's time
   std::int64_t states_due_ = 0;
   std::int64_t looks_ = 0;  ///< of the tracker
   std::uint64_t refused_ = 0;
   std::uint64_t slips_ = 0;
 
   mutable std::mutex inbox_mutex_;
+  std::condition_variable_any arrived_;
   std::deque<Arrival> inbox_;
   std::map<std::string, std::uint64_t> last_seq_;  ///< by who sent it
   std::uint64_t overrun_ = 0;
 
+  std::unique_ptr<ircp::ClockResponder> picture_clock_;  ///< null: pictures go by the one bus
   std::unique_ptr<Cameras> cameras_;
   std::unique_ptr<ircp::Writer<ircp::JointStateSample>> state_writer_;
   std::unique_ptr<Outbox<Outgoing>> states_;
@@ -575,6 +560,15 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
     return InvalidArgument(
         "track rate is " + FormatDouble(options.track_hz) + " Hz, must be 0 to one a step",
         "track-hz");
+  }
+  if (options.stand_after < Duration(0)) {
+    return InvalidArgument("time is to stand after " +
+                               FormatDouble(ToSeconds(options.stand_after)) +
+                               " s, must not be negative",
+                           "stand-after-s");
+  }
+  if (options.stand_after > Duration(0) && options.in_step_with.empty()) {
+    return InvalidArgument("time can stand still only for programs in step", "stand-after-s");
   }
   if (options.command_delay < Duration(0)) {
     return InvalidArgument("command delay is " + FormatDouble(ToSeconds(options.command_delay)) +

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -40,6 +41,9 @@ struct SessionOptions {
   /// cameras see what has a marker.
   double track_hz = 0;
   bool cameras = true;
+  /// Where pictures go, which would be in the way of the rest; null: to the session's own. Outlives
+  /// the session.
+  ircp::Bus* picture_bus = nullptr;
   /// "jpeg" or "png", and the former's quality.
   std::string picture_encoding = "jpeg";
   int picture_quality = 95;
@@ -50,6 +54,12 @@ struct SessionOptions {
   double pace = 1;
   /// Programs that follow the simulated time: it waits for them.
   std::vector<std::string> in_step_with = {};
+  /// In step: once nobody has commanded the robot for so long (simulated), time stands still until
+  /// somebody does: a motion then begins at a time that no request's arrival decides. 0: it goes
+  /// on.
+  Duration stand_after{0};
+  /// In step: what the wall clock says at the beginning; the machine's, when absent.
+  std::optional<Stamp> epoch = {};
   /// From a command's arrival until the servos hear of it.
   Duration command_delay{0};
   SensorNoise noise = {};

@@ -30,7 +30,8 @@ class SimulatedTime : public ::testing::Test {
     return std::move(*clock);
   }
   bool Lead(TimeLeader& leader, Duration time) {
-    return leader.Lead(time, Stamp() + std::chrono::hours(1) + time, kTakenAll, stop_.get_token());
+    return leader.Lead(time, Stamp() + std::chrono::hours(1) + time, {}, kTakenAll,
+                       stop_.get_token());
   }
 
   SystemClock real_;
@@ -110,7 +111,7 @@ TEST_F(SimulatedTime, WaitsForCommandsOnTheirWay) {
       ++asked;
       return taken.load();
     };
-    EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), count, {}));
+    EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, count, {}));
     moved = true;
   });
   ASSERT_TRUE(Eventually([&] { return asked > 0; }));
@@ -118,6 +119,60 @@ TEST_F(SimulatedTime, WaitsForCommandsOnTheirWay) {
   taken = 3;
   leader->Recheck();
   EXPECT_TRUE(Eventually([&] { return moved.load(); }));
+}
+
+TEST_F(SimulatedTime, ComesWhenWhatWasSentBeforeIsTakenIn) {
+  const auto clock = MakeClock();
+  std::atomic<std::uint64_t> states{0};
+  std::atomic<int> asked{0};
+  clock->SetInputsTaken([&](const SentInputs& sent) {
+    EXPECT_EQ(sent.objects, 9u);
+    ++asked;
+    return states >= sent.joint_states;
+  });
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  std::atomic<bool> reached{false};
+  const std::jthread leading([&] {
+    EXPECT_TRUE(leader->Lead(milliseconds(8), Stamp(), {.joint_states = 2, .objects = 9}, kTakenAll,
+                             stop_.get_token()));
+    reached = true;
+  });
+  ASSERT_TRUE(Eventually([&] { return asked > 0; }));
+  states = 1;
+  const int before = asked;
+  clock->Recheck();
+  ASSERT_TRUE(Eventually([&] { return asked > before; }));
+  EXPECT_EQ(clock->Steady(), Duration(0));
+  EXPECT_FALSE(reached);
+  states = 2;
+  clock->Recheck();
+  ASSERT_TRUE(Eventually([&] { return reached.load(); }));
+  EXPECT_EQ(clock->Steady(), milliseconds(8));
+  clock->SetInputsTaken(nullptr);
+}
+
+TEST_F(SimulatedTime, WaitsForAProgramUntilItIsComplete) {
+  const auto clock = MakeClock("executor", {.answers_at_once = false});
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  std::atomic<bool> reached{false};
+  const std::jthread leading([&] {
+    EXPECT_TRUE(Lead(*leader, milliseconds(3)));
+    reached = true;
+  });
+  EXPECT_TRUE(clock->WaitForLeader({}));
+  EXPECT_FALSE(reached);
+  clock->SetInputsTaken([](const SentInputs&) { return true; });
+  EXPECT_TRUE(Eventually([&] { return reached.load(); }));
+  clock->SetInputsTaken(nullptr);
+}
+
+TEST_F(SimulatedTime, IsNotHeldUpByASampleThatNeverComes) {
+  const auto clock = MakeClock("executor", {.input_patience = milliseconds(1)});
+  clock->SetInputsTaken([](const SentInputs&) { return false; });
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  EXPECT_TRUE(Lead(*leader, milliseconds(1)));
+  EXPECT_EQ(clock->Steady(), milliseconds(1));
+  clock->SetInputsTaken(nullptr);
 }
 
 TEST_F(SimulatedTime, GoesOnWithoutAFollowerThatFellSilentAndNamesIt) {

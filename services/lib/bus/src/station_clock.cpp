@@ -12,7 +12,7 @@ Result<StationClock> StationClock::Follow(ParticipantOptions options, const std:
   auto participant = Participant::Create(std::move(options));
   if (!participant.ok()) return participant.error();
   clock.participant_ = std::move(*participant);
-  auto network = ircp::NetworkClock::Create(*clock.participant_, name);
+  auto network = ircp::NetworkClock::Create(*clock.participant_, name, {.answers_at_once = false});
   if (!network.ok()) return network.error();
   clock.network_ = std::move(*network);
   if (!clock.network_->WaitForLeader(std::move(stop))) {
@@ -28,6 +28,14 @@ const Clock& StationClock::operator*() const {
 
 void StationClock::SetCommandsSent(std::function<std::uint64_t()> commands_sent) {
   if (network_) network_->SetCommandsSent(std::move(commands_sent));
+}
+
+void StationClock::SetInputsTaken(std::function<bool(const ircp::SentInputs&)> inputs_taken) {
+  if (network_) network_->SetInputsTaken(std::move(inputs_taken));
+}
+
+void StationClock::Recheck() {
+  if (network_) network_->Recheck();
 }
 
 }  // namespace exemplar::bus

@@ -78,6 +78,23 @@ class Follower final : public NetworkClock {
     commands_sent_ = std::move(commands_sent);
   }
 
+  void SetInputsTaken(std::function<bool(const SentInputs&)> inputs_taken) override {
+    {
+      const std::lock_guard lock(asking_mutex_);
+      inputs_taken_ = std::move(inputs_taken);
+      is_complete_ = true;
+    }
+    Recheck();
+  }
+
+  void Recheck() override {
+    {
+      const std::lock_guard lock(mutex_);
+      ++rechecks_;
+    }
+    settled_.notify_all();
+  }
+
   int asleep() const override {
     const std::lock_guard lock(mutex_);
     return static_cast<int>(std::count_if(
@@ -87,7 +104,7 @@ class Follower final : public NetworkClock {
 
   bool WaitForLeader(std::stop_token stop) const override {
     std::unique_lock lock(mutex_);
-    return moved_.wait(lock, stop, [this] { return !leader_.empty(); });
+    return moved_.wait(lock, stop, [this] { return has_time_; });
   }
 
  private:
@@ -99,50 +116,85 @@ class Follower final : public NetworkClock {
     return static_cast<std::size_t>(it - sleepers_.begin());
   }
 
-  /// On a thread of the network.
+  /// On a thread of the network: only hands over.
   void Take(const ClockSample& sample, const Reception& from) {
-    const Duration told(sample.first.nanoseconds());
+    if (sample.second.nanoseconds() < 0 || sample.third.nanoseconds() < 0) return;
     {
       const std::lock_guard lock(mutex_);
       if (leader_ != from.writer) {
         leader_ = from.writer;
         leader_name_ = sample.header.source;
-        offset_ = steady_ - told;
+        offset_ = steady_ - Duration(sample.first.nanoseconds());
       }
-      if (told + offset_ >= steady_) {
-        steady_ = told + offset_;
-        now_ = sample.header.stamp;
-      }
-      for (Sleeper& sleeper : sleepers_) {
-        if (sleeper.state != Sleeper::State::kAsleep || sleeper.deadline > steady_) continue;
-        sleeper.state = Sleeper::State::kAwake;
-        sleeper.woken = RealTime::now();
-      }
-      told_ = told;
+      told_ = Duration(sample.first.nanoseconds());
+      told_stamp_ = sample.header.stamp;
+      told_sent_ = {static_cast<std::uint64_t>(sample.second.nanoseconds()),
+                    static_cast<std::uint64_t>(sample.third.nanoseconds())};
       is_asked_ = true;
+      ++rechecks_;
     }
-    moved_.notify_all();
     settled_.notify_all();
   }
 
   void Reply(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     while (settled_.wait(lock, stop, [this] { return is_asked_; })) {
+      is_asked_ = false;
+      const Duration told = told_;
+      const Stamp stamp = told_stamp_;
+      if (!WaitForInputs(lock, told_sent_, stop)) return;
+      if (told != told_) continue;  // another leader, meanwhile
+      MoveOn(told, stamp);
       if (!WaitForSleepers(lock, stop)) return;
       ClockSample reply;
       reply.mode = "reached";
       reply.peer = leader_name_;
-      reply.first = Stamp::FromNanoseconds(told_.count());
-      is_asked_ = false;
+      reply.first = Stamp::FromNanoseconds(told.count());
       lock.unlock();
+      bool answers = options_.answers_at_once;
       {
         const std::lock_guard asking(asking_mutex_);
+        answers = answers || is_complete_;
         const std::uint64_t sent = commands_sent_ ? commands_sent_() : 0;
         reply.third = Stamp::FromNanoseconds(static_cast<std::int64_t>(sent));
       }
-      (void)writer_->Write(std::move(reply));  // the leader asks again for one that is lost
+      // The leader asks again, for one that is lost as well.
+      if (answers) (void)writer_->Write(std::move(reply));
       lock.lock();
     }
+  }
+
+  /// Mutex held.
+  void MoveOn(Duration told, Stamp stamp) {
+    if (told + offset_ >= steady_) {
+      steady_ = told + offset_;
+      now_ = stamp;
+    }
+    has_time_ = true;
+    for (Sleeper& sleeper : sleepers_) {
+      if (sleeper.state != Sleeper::State::kAsleep || sleeper.deadline > steady_) continue;
+      sleeper.state = Sleeper::State::kAwake;
+      sleeper.woken = RealTime::now();
+    }
+    moved_.notify_all();
+  }
+
+  bool WaitForInputs(std::unique_lock<std::mutex>& lock, SentInputs sent,
+                     const std::stop_token& stop) {
+    const RealTime::time_point patient = RealTime::now() + options_.input_patience;
+    while (!stop.stop_requested()) {
+      const std::uint64_t asked = rechecks_;
+      lock.unlock();
+      bool taken = true;
+      {
+        const std::lock_guard asking(asking_mutex_);
+        if (inputs_taken_) taken = inputs_taken_(sent);
+      }
+      lock.lock();
+      if (taken || RealTime::now() >= patient) return true;
+      settled_.wait_until(lock, stop, patient, [&] { return rechecks_ != asked; });
+    }
+    return false;
   }
 
   bool WaitForSleepers(std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
@@ -178,10 +230,16 @@ class Follower final : public NetworkClock {
   Duration offset_{0};  ///< steady time minus the leader's
   Duration steady_{0};
   Stamp now_;
-  Duration told_{0};
+  bool has_time_ = false;
+  Duration told_{0};  ///< what the leader said last
+  Stamp told_stamp_;
+  SentInputs told_sent_;
   bool is_asked_ = false;
+  std::uint64_t rechecks_ = 0;
   std::mutex asking_mutex_;  ///< nobody is asked who has been forgotten
   std::function<std::uint64_t()> commands_sent_;
+  std::function<bool(const SentInputs&)> inputs_taken_;
+  bool is_complete_ = false;  ///< SetInputsTaken was called
   std::unique_ptr<Writer<ClockSample>> writer_;
   std::jthread replier_;
   std::unique_ptr<Reader> reader_;

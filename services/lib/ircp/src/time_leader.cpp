@@ -31,7 +31,7 @@ class Leader final : public TimeLeader {
     return {};
   }
 
-  bool Lead(Duration time, Stamp stamp,
+  bool Lead(Duration time, Stamp stamp, const SentInputs& sent,
             const std::function<std::uint64_t(const std::string&)>& taken,
             std::stop_token stop) override {
     const Duration begin = clock_.Steady();
@@ -40,6 +40,8 @@ class Leader final : public TimeLeader {
       sample.header.stamp = stamp;
       sample.mode = "sim";
       sample.first = Stamp::FromNanoseconds(time.count());
+      sample.second = Stamp::FromNanoseconds(static_cast<std::int64_t>(sent.joint_states));
+      sample.third = Stamp::FromNanoseconds(static_cast<std::int64_t>(sent.objects));
       (void)writer_->Write(std::move(sample));  // said again below
       std::unique_lock lock(mutex_);
       const bool reached =

@@ -16,7 +16,8 @@ namespace exemplar::bus {
 class StationClock {
  public:
   /// Follows the simulated time, by a participant of its own (`options`, whose clock is not used),
-  /// as the program `name`. Waits until it is heard; kCancelled: `stop` came first.
+  /// as the program `name`. Waits until it is heard; kCancelled: `stop` came first. Time waits for
+  /// the program until SetInputsTaken.
   static Result<StationClock> Follow(ParticipantOptions options, const std::string& name,
                                      std::stop_token stop);
   /// The machine's.
@@ -26,6 +27,8 @@ class StationClock {
   /// What the simulated time waits for beside the program's loops (ircp::NetworkClock); no meaning
   /// for the machine's clock. Null before what it asks goes.
   void SetCommandsSent(std::function<std::uint64_t()> commands_sent);
+  void SetInputsTaken(std::function<bool(const ircp::SentInputs&)> inputs_taken);
+  void Recheck();
 
  private:
   SystemClock system_;

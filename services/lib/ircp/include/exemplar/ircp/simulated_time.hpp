@@ -3,8 +3,11 @@
 // whole system runs as fast as it can, in step.
 //
 // The leader says {mode "sim", stamp: the simulated wall time, first: simulated time since its
-// start} and says it again until everybody in step has answered {mode "reached", first: that time,
-// third: how many joint commands the follower has sent so far}. Only then does it move time on.
+// start, second and third: how many joint states and how many poses of objects it has sent so far}
+// and says it again until everybody in step has answered {mode "reached", first: that time, third:
+// how many joint commands the follower has sent so far}. Only then does it move time on. A follower
+// comes to the new time once it has taken in what was sent before, so that the same run gives the
+// same result to the last bit.
 
 #include <cstdint>
 #include <functional>
@@ -18,10 +21,25 @@
 
 namespace exemplar::ircp {
 
+/// The sources of what a leader's samples count: the simulated robot, and what tracks objects.
+inline constexpr const char* kRobotSource = "robot";
+inline constexpr const char* kTrackerSource = "tracker";
+
+/// Samples that the leader has sent so far, by their numbers (ircp::Header::seq).
+struct SentInputs {
+  std::uint64_t joint_states = 0;  ///< of kRobotSource
+  std::uint64_t objects = 0;       ///< of kTrackerSource
+};
+
 struct NetworkClockOptions {
   /// A thread that a moment woke and that does not sleep again has left its loop: nobody waits for
   /// it longer than so long (of real time).
   Duration patience = std::chrono::milliseconds(500);
+  /// What the leader has sent is waited for no longer than so long (of real time).
+  Duration input_patience = std::chrono::seconds(5);
+  /// False: nothing is answered before SetInputsTaken, so that time waits for a program that is not
+  /// yet complete.
+  bool answers_at_once = true;
 };
 
 /// Time as the leader says it. A moment is answered once every thread that it woke sleeps again.
@@ -35,6 +53,10 @@ class NetworkClock : public Clock {
                                                       const NetworkClockOptions& options = {});
   /// Asked before each answer: joint commands that are on their way. Null: none are sent.
   virtual void SetCommandsSent(std::function<std::uint64_t()> commands_sent) = 0;
+  /// Asked before time moves on: whether everything sent until then was taken in. Null: yes.
+  virtual void SetInputsTaken(std::function<bool(const SentInputs&)> inputs_taken) = 0;
+  /// Something was taken in: asks again.
+  virtual void Recheck() = 0;
   /// Threads that sleep by this clock.
   virtual int asleep() const = 0;
   /// Until the leader was heard; false when `stop` came first.
@@ -57,9 +79,10 @@ class TimeLeader {
                                                     const std::string& program,
                                                     const TimeLeaderOptions& options = {});
   virtual ~TimeLeader() = default;
-  /// Says the time, and returns when everybody in step has reached it; false when `stop` came
-  /// first. `taken` tells how many of a program's joint commands have arrived.
-  virtual bool Lead(Duration time, Stamp stamp,
+  /// Says the time and what was sent before, and returns when everybody in step has reached it;
+  /// false when `stop` came first. `taken` tells how many of a program's joint commands have
+  /// arrived.
+  virtual bool Lead(Duration time, Stamp stamp, const SentInputs& sent,
                     const std::function<std::uint64_t(const std::string&)>& taken,
                     std::stop_token stop) = 0;
   /// Wakes Lead to ask `taken` again. Thread-safe.
