@@ -26,15 +26,18 @@ int main(int argc, char** argv) {
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(common, "recorder");
   const SystemClock clock;
-  auto participant = bus::Participant::Create({.domain = common.domain,
-                                               .station = common.station,
-                                               .name = kName,
-                                               .interfaces = common.interfaces,
-                                               .peers = common.peers,
-                                               .discovery_servers = common.discovery_servers,
-                                               .best_effort_topics = common.best_effort,
-                                               .clock = &clock,
-                                               .log = log.get()});
+  auto participant =
+      bus::Participant::Create({.domain = common.domain,
+                                .station = common.station,
+                                .name = kName,
+                                .interfaces = common.interfaces,
+                                .peers = common.peers,
+                                .discovery_servers = common.discovery_servers,
+                                .best_effort_topics = common.best_effort,
+                                .shared_memory_bytes = bus::kPictureSharedMemoryBytes,
+                                .security = common.security,
+                                .clock = &clock,
+                                .log = log.get()});
   if (!participant) return program::Fail(kName, participant.error());
 
   const auto clocks = ircp::ClockWatch::Create(**participant, clock, *log, "recorder");
@@ -65,6 +68,8 @@ int main(int argc, char** argv) {
   auto server = rpc::Server::Create(
       {.listen = common.listen,
        .port_file = common.port_file,
+       .credentials = common.server,
+       .log = log.get(),
        .on_call = [&calls](const rpc::CallRecord& call) { calls.Record(call); }},
       {.recorder = &api});
   if (!server) return program::Fail(kName, server.error());

@@ -329,8 +329,11 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
   if (part == "codec") return Codec(folder);
   const program::Signals signals;  // before anything that starts threads
-  const auto network = bus::Participant::Create(
-      {.domain = options.common().domain, .station = options.common().station, .name = kName});
+  const auto network =
+      bus::Participant::Create({.domain = options.common().domain,
+                                .station = options.common().station,
+                                .name = kName,
+                                .shared_memory_bytes = bus::kPictureSharedMemoryBytes});
   if (!network) return program::Fail(kName, network.error());
   return part == "publish" ? Publish(**network, signals, seconds)
                            : Drain(**network, signals, ready_file);
