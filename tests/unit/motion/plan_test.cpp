@@ -374,6 +374,37 @@ TEST_F(PlanOnArm7, StopsWhenCancelled) {
   EXPECT_EQ(plan.error().code, ErrorCode::kCancelled);
 }
 
+// The arm comes across its own torso, where the elbow that hangs as at home has no room.
+TEST(Plan, StandsAnotherWayWhereTheUsualOneIsInItsOwnWay) {
+  const kinematics::RobotDescription robot = test::LoadRobot("leonardo");
+  const CollisionChecker checker =
+      *CollisionChecker::Create(robot.model, {}, collision::OptionsOf(robot));
+  PlanOptions options;
+  options.touch_links = robot.touch_links;
+  options.comfortable = robot.home;
+  const geometry::Pose contact{{0.342, 0.063, 0.036},
+                               Eigen::Quaterniond(0.158, 0.625, 0.725, 0.243).normalized()};
+  geometry::Pose above = contact;
+  above.translation.z() += 0.08;
+  const geometry::Pose ways[] = {robot.chain.ToolPose(robot.home), above, contact, above};
+  SkillMotion motion;
+  constexpr int kFrames = 60;
+  for (int leg = 0; leg < 3; ++leg) {
+    for (int k = 0; k < kFrames; ++k) {
+      const double s = static_cast<double>(k) / kFrames;
+      const double smooth = s * s * s * (10 - 15 * s + 6 * s * s);
+      motion.base_T_tool.push_back(geometry::Interpolate(ways[leg], ways[leg + 1], smooth));
+      motion.time_s.push_back((kFrames * leg + k) / 40.0);
+    }
+  }
+  motion.joints.resize(motion.frames(), 0);
+  const Result<PlannedMotion> plan =
+      PlanMotion(motion, robot.model, robot.chain, checker, robot.home, options);
+  ASSERT_TRUE(plan.ok()) << plan.error().message;
+  EXPECT_GT(plan->report.branches_tried, options.max_branches);
+  EXPECT_GE(plan->report.smallest_clearance.distance_m, options.required_clearance_m);
+}
+
 TEST(Plan, FollowsRandomReachablePathsOnEveryModel) {
   Rng rng(11);
   for (const char* name : {"arm7", "leonardo", "ur5e_like"}) {

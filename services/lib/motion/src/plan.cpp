@@ -6,6 +6,7 @@
 
 #include "approach.hpp"
 #include "avoid.hpp"
+#include "clear_postures.hpp"
 #include "describe.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
@@ -27,6 +28,8 @@ constexpr double kRoughSmoothness = 1e-4;
 /// Beyond the clearance asked for, where joints turn away from obstacles.
 constexpr double kAvoidingMargin_m = 0.02;
 constexpr int kAvoidingRounds = 10;
+/// Other postures that the joints may be drawn to, at each of the frames where they are sought.
+constexpr std::size_t kOtherPostures = 3;
 
 std::string FrameAt(const SkillMotion& motion, int frame) {
   return "frame " + std::to_string(frame) + " of " + std::to_string(motion.frames()) + " (" +
@@ -484,12 +487,6 @@ class Planner {
     return plan;
   }
 
- private:
-  std::vector<std::string> TouchLinks() const {
-    if (!options_.touch_links.empty()) return options_.touch_links;
-    return {chain_.tip_link()};
-  }
-
   /// What may be touched at each frame of the skill's motion: near the contacts, along the path.
   FrameTouches TouchesByFrame() const {
     const std::vector<geometry::Pose>& path = prepared_.path.base_T_tool;
@@ -507,6 +504,12 @@ class Planner {
       }
     }
     return touches;
+  }
+
+ private:
+  std::vector<std::string> TouchLinks() const {
+    if (!options_.touch_links.empty()) return options_.touch_links;
+    return {chain_.tip_link()};
   }
 
   const SkillMotion& motion_;
@@ -572,6 +575,24 @@ Result<PlannedMotion> PlanMotion(const SkillMotion& motion, const kinematics::Ro
   for (const Branch& branch : FindBranches(chain, prepared->path, start)) {
     if (tried >= std::max(1, options.max_branches)) break;
     if (auto done = attempt(planner.From(branch, stop))) return *done;
+  }
+  if (first_refusal->field != "motion" || all_demonstrated) return *first_refusal;
+  // Perhaps what the joints are drawn to is in the way of itself, and another posture is not.
+  const FrameTouches touches = planner.TouchesByFrame();
+  std::vector<int> frames = {motion.frames() / 2};
+  if (!motion.contacts.empty()) frames.insert(frames.begin(), motion.contacts.front().first);
+  for (const int frame : frames) {
+    for (const Eigen::VectorXd& posture :
+         ClearPostures(model, chain, checker, prepared->path, frame, touches[frame],
+                       options.required_clearance_m, kOtherPostures)) {
+      Prepared other = *prepared;
+      for (int j = 0; j < chain.dof(); ++j) {
+        if (prepared->demonstrated[j] < 0) other.path.style.col(j).setConstant(posture[j]);
+      }
+      const Planner drawn(motion, model, chain, checker, start, options, other);
+      const Branch way = FindBranches(chain, other.path, start).front();
+      if (auto done = attempt(drawn.From(way, stop))) return *done;
+    }
   }
   return *first_refusal;
 }
