@@ -256,6 +256,7 @@ TEST_P(CallsTest, ExecutionStreamsFeedbackAndEndsWithTheResult) {
   ASSERT_TRUE(result.ok()) << result.error().message;
   EXPECT_EQ(result->state, "done");
   EXPECT_EQ(last_state, "executing");
+  EXPECT_EQ(result->detail.rfind("asked by request", 0), 0U) << result->detail;
 }
 
 TEST_P(CallsTest, CancellingAnExecutionReachesTheRobot) {
@@ -285,6 +286,33 @@ TEST_P(CallsTest, ShutdownEndsADetachedMotion) {
   ASSERT_TRUE(clients_.executor->Execute(request, {}, {}).ok());
   server_.reset();
   backend_.reset();
+  EXPECT_TRUE(executor_.ended.Wait());
+}
+
+TEST_P(CallsTest, TeleoperationFeedsBackUntilItEnds) {
+  Start();
+  std::vector<std::string> phases;
+  const auto note = [&](const api::TeleoperationFeedback& now) {
+    phases.push_back(now.phase);
+    EXPECT_TRUE(clients_.executor->EndTeleoperation().ok());
+  };
+  const auto done = clients_.executor->Teleoperate({}, note, {});
+  ASSERT_TRUE(done.ok()) << done.error().message;
+  EXPECT_EQ(done->state, "done");
+  EXPECT_EQ(phases, std::vector<std::string>{"holding"});
+  api::TeleoperationRequest silent;
+  silent.suit = "none";
+  EXPECT_EQ(clients_.executor->Teleoperate(silent, {}, {}).error().code, ErrorCode::kUnavailable);
+}
+
+TEST_P(CallsTest, ADetachedTeleoperationGoesOnWithoutItsCall) {
+  Start();
+  api::TeleoperationRequest request;
+  request.detached = true;
+  const auto on = clients_.executor->Teleoperate(request, {}, {});
+  ASSERT_TRUE(on.ok()) << on.error().message;
+  EXPECT_EQ(on->state, "teleoperating");
+  EXPECT_TRUE(clients_.executor->EndTeleoperation().ok());
   EXPECT_TRUE(executor_.ended.Wait());
 }
 
@@ -339,8 +367,8 @@ TEST_P(CallsTest, CallsAreReportedWithTheirRequestId) {
                                                "exemplar.v1.TrialService/Get mine-2 not_found"}));
 }
 
-INSTANTIATE_TEST_SUITE_P(AllWays, CallsTest, testing::Bool(), [](const auto& info) {
-  return std::string(info.param ? "ThroughAGateway" : "Directly");
+INSTANTIATE_TEST_SUITE_P(AllWays, CallsTest, testing::Bool(), [](const auto& way) {
+  return std::string(way.param ? "ThroughAGateway" : "Directly");
 });
 
 TEST(CallLogTest, SumsCallsByMethodAndOutcome) {

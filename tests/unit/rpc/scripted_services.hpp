@@ -178,7 +178,7 @@ class ScriptedExecutor final : public api::ExecutorApi {
     return FailedPrecondition("at 1.2 s forearm and table meet, 3 mm deep");
   }
   Result<api::ExecutionResult> Execute(
-      const api::ExecuteRequest&,
+      const api::ExecuteRequest& request,
       const std::function<void(const api::ExecutionFeedback&)>& feedback,
       std::stop_token stop) override {
     feedback({.state = "planning"});
@@ -187,6 +187,7 @@ class ScriptedExecutor final : public api::ExecutorApi {
     ended.Open();
     api::ExecutionResult result;
     result.state = finished ? "done" : "aborted";
+    result.detail = "asked by " + request.client;
     return result;
   }
   Result<api::RobotStatus> GetStatus() override {
@@ -200,6 +201,25 @@ class ScriptedExecutor final : public api::ExecutorApi {
   Status Stop() override { return Note("stop"); }
   Status Reset() override { return Note("reset"); }
   Status SetSpeed(double factor) override { return Note("speed " + std::to_string(factor)); }
+  Result<api::TeleoperationResult> Teleoperate(
+      const api::TeleoperationRequest& request,
+      const std::function<void(const api::TeleoperationFeedback&)>& feedback,
+      std::stop_token stop) override {
+    if (request.suit == "none") return Unavailable("nothing was heard");
+    api::TeleoperationFeedback now;
+    now.state = "teleoperating";
+    now.phase = "holding";
+    feedback(now);
+    const bool finished = finish.Wait(stop);
+    ended.Open();
+    api::TeleoperationResult result;
+    result.state = finished ? "done" : "aborted";
+    return result;
+  }
+  Status EndTeleoperation() override {
+    finish.Open();
+    return Note("end teleoperation");
+  }
 
   Gate finish, ended;
   std::vector<std::string> notes;
