@@ -24,6 +24,8 @@ void AddReplayCommand(Command& record);
 /// `watch`: of a gateway, or on the network itself.
 void AddWatchCommand(Command& root, const Session& session);
 void AddDoctorCommand(Command& root, const Session& session);
+/// `security`: on files of this machine, without a server.
+void AddSecurityCommands(Command& root);
 void AddCompletionCommand(Command& root);
 
 /// What the scripts of `completion` ask for: how the last of `words` may go on, a line each.

@@ -30,14 +30,11 @@ int main(int argc, char** argv) {
       .Option("--tls-ca", "FILE", session.credentials.ca,
               "PEM file of the CA that the server's certificate comes from")
       .FromEnvironment("EXEMPLAR_TLS_CA")
-      .Completes(cli::Names::kFiles)
       .Option("--tls-cert", "FILE", session.credentials.certificate,
               "PEM file with your own certificate, and")
       .FromEnvironment("EXEMPLAR_TLS_CERT")
-      .Completes(cli::Names::kFiles)
       .Option("--tls-key", "FILE", session.credentials.key, "with its key")
       .FromEnvironment("EXEMPLAR_TLS_KEY")
-      .Completes(cli::Names::kFiles)
       .Option("--token", "TOKEN", session.credentials.token,
               "sent with each call; @FILE reads a file")
       .FromEnvironment("EXEMPLAR_TOKEN");
@@ -47,6 +44,7 @@ int main(int argc, char** argv) {
   cli::AddRecordCommands(line.root(), session);
   cli::AddWatchCommand(line.root(), session);
   cli::AddDoctorCommand(line.root(), session);
+  cli::AddSecurityCommands(line.root());
   cli::AddCompletionCommand(line.root());
 
   const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);

@@ -1,5 +1,7 @@
 // exemplar-executor: carries skills out on a robot, checked for collisions, over DDS.
 
+#include <filesystem>
+
 #include "executor/executor.hpp"
 #include "executor/metrics.hpp"
 #include "executor/realtime.hpp"
@@ -19,12 +21,13 @@ int main(int argc, char** argv) {
   std::string learning;
   executor::ExecutorOptions settings;
   settings.realtime = true;
+  settings.planner.guard.touch_n = 8;
 
   program::Options options(
       kName, "Executes skills on a robot: inverse kinematics, collision checks, joint commands",
       "exemplar-executor --robot deploy/models/arm7 --scene deploy/config/rail_press.yaml "
       "--learning 127.0.0.1:50051",
-      {.bus = true, .server = true, .clock = true});
+      {.bus = true, .server = true, .clock = true, .client = true});
   options.Add("--robot", robot_folder, "folder with robot.yaml and the URDF").Required();
   options.Add("--scene", scene_file, "file that says what stands around the robot").Required();
   options.Add("--learning", learning, "HOST:PORT of the learning service").Required();
@@ -63,8 +66,8 @@ int main(int argc, char** argv) {
       .MinMax(0, 10);
   options
       .Add("--guard-touch-n", settings.planner.guard.touch_n,
-           "a press goes on slowly past the expected contact until a touch of this force ends it; "
-           "0: by position alone")
+           "where the robot feels touch: a press goes on slowly past the expected contact until a "
+           "touch of this force, or twice what the button needs, ends it; 0: by position alone")
       .MinMax(0, 1000);
   options
       .Add("--guard-distance-m", settings.planner.guard.distance_m,
@@ -75,7 +78,35 @@ int main(int argc, char** argv) {
   std::string way = "exemplar";
   options.Add("--inverse-kinematics", way, "how joints are made to follow a tool path")
       .OneOf({"exemplar", "plain", "energy", "path"});
+  std::string joint_map;
+  options.Add(
+      "--joint-map", joint_map,
+      "file that says which joint of a suit drives which of the robot; the robot's folder's "
+      "suit.yaml when not given");
+  executor::TeleoperationOptions& teleoperation = settings.teleoperation;
+  options
+      .Add("--teleop-clearance-m", teleoperation.clearance_m,
+           "room that a teleoperated robot keeps to everything but what it may touch")
+      .MinMax(0.001, 0.5);
+  options
+      .Add("--approach-range", teleoperation.approach_range_rad,
+           "how far a joint may be from the operator's when teleoperation begins, in rad or m")
+      .MinMax(0.01, 10);
+  options
+      .Add("--approach-speed", teleoperation.approach_share,
+           "on the way there, share of the joints' speed limits")
+      .MinMax(0.01, 1);
+  double suit_patience_s = 0.15;
+  options.Add("--suit-patience-s", suit_patience_s, "how old ircp/suit may be").MinMax(0.03, 2);
+  double dead_man_patience_s = 0.25;
+  options
+      .Add("--dead-man-patience-s", dead_man_patience_s,
+           "how old the dead-man on ircp/safety may be")
+      .MinMax(0.06, 2);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
+  teleoperation.suit_patience = FromSeconds(suit_patience_s);
+  teleoperation.suit.lateness = teleoperation.suit_patience;
+  teleoperation.dead_man_patience = FromSeconds(dead_man_patience_s);
   settings.planner.state_patience = FromSeconds(state_patience_s);
   settings.watch.stream.delay_patience = settings.planner.state_patience;
   settings.watch.stream.command_patience = FromSeconds(command_patience_s);
@@ -96,9 +127,17 @@ int main(int argc, char** argv) {
     if (!read.ok()) return options.Refuse(read.error().message);
     *tolerance = *read;
   }
+  const std::filesystem::path own_map = std::filesystem::path(robot_folder) / "suit.yaml";
+  if (joint_map.empty() && std::filesystem::exists(own_map)) joint_map = own_map.string();
+  if (!joint_map.empty()) {
+    auto map = executor::JointMap::Read(joint_map, robot->chain.joint_names());
+    if (!map.ok()) return program::Fail(kName, map.error());
+    settings.joint_map = *std::move(map);
+  }
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene.ok()) return program::Fail(kName, scene.error());
-  const auto clients = rpc::Connect({.server = learning, .request_id = "executor"});
+  const auto clients = rpc::Connect(
+      {.server = learning, .request_id = "executor", .credentials = options.common().client});
   if (!clients.ok()) return program::Fail(kName, clients.error());
   bus::ParticipantOptions network{.domain = options.common().domain,
                                   .station = options.common().station,
@@ -107,6 +146,7 @@ int main(int argc, char** argv) {
                                   .peers = options.common().peers,
                                   .discovery_servers = options.common().discovery_servers,
                                   .best_effort_topics = options.common().best_effort,
+                                  .security = options.common().security,
                                   .log = log.get()};
   bus::StationClock station_clock;
   if (options.common().clock == "network") {
@@ -118,6 +158,7 @@ int main(int argc, char** argv) {
   network.clock = &clock;
   auto participant = bus::Participant::Create(network);
   if (!participant.ok()) return program::Fail(kName, participant.error());
+  settings.on_taken = [&station_clock] { station_clock.Recheck(); };
   auto app = executor::Executor::Create(**participant, clock, *log, *clients->skills, *robot,
                                         *scene, settings);
   if (!app.ok()) return program::Fail(kName, app.error());
@@ -125,6 +166,8 @@ int main(int argc, char** argv) {
   auto server = rpc::Server::Create(
       {.listen = options.common().listen,
        .port_file = options.common().port_file,
+       .credentials = options.common().server,
+       .log = log.get(),
        .on_call = [&calls](const rpc::CallRecord& call) { calls.Record(call); }},
       {.executor = app->get()});
   if (!server.ok()) return program::Fail(kName, server.error());
@@ -137,10 +180,13 @@ int main(int argc, char** argv) {
   log->Info("serving", {{"address", (*server)->address()}, {"robot", robot->name}});
 
   station_clock.SetCommandsSent([&app] { return (*app)->CommandsSent(); });
+  station_clock.SetInputsTaken(
+      [&app](const ircp::SentInputs& sent) { return (*app)->HasTaken(sent); });
   signals.Wait();
   (*app)->Shutdown();
   (*server)->Shutdown(std::chrono::seconds(1));
   station_clock.SetCommandsSent(nullptr);
+  station_clock.SetInputsTaken(nullptr);
   log->Info("stopped");
   return 0;
 }

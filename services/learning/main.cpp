@@ -43,6 +43,8 @@ int main(int argc, char** argv) {
   const auto server =
       rpc::Server::Create({.listen = common.listen,
                            .port_file = common.port_file,
+                           .credentials = common.server,
+                           .log = log.get(),
                            .on_call = [&](const rpc::CallRecord& call) { calls.Record(call); }},
                           {.trials = &trials, .skills = &skills});
   if (!server) return program::Fail(kName, server.error());

@@ -33,6 +33,7 @@ int main(int argc, char** argv) {
                                 .peers = options.common().peers,
                                 .discovery_servers = options.common().discovery_servers,
                                 .best_effort_topics = options.common().best_effort,
+                                .security = options.common().security,
                                 .clock = &clock,
                                 .log = log.get()});
   if (!participant.ok()) return program::Fail(kName, participant.error());
