@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -22,8 +24,11 @@ using ::testing::HasSubstr;
 /// A session on a network within the process; time moves only in Advance.
 class SessionRig : public testing::Test {
  protected:
-  void Begin(Leader leader) {
-    SessionOptions options;
+  explicit SessionRig(const std::string& robot = "leonardo",
+                      const std::string& scene = "press_table.yaml")
+      : robot_(Robot(robot)), scene_(Scene(scene)) {}
+
+  void Begin(Leader leader, SessionOptions options = {}) {
     options.leader = leader;
     options.cameras = false;
     auto session = Session::Create(bus_, clock_, log_, robot_, scene_, options);
@@ -102,8 +107,8 @@ class SessionRig : public testing::Test {
     return sample;
   }
 
-  const kinematics::RobotDescription robot_ = Robot("leonardo");
-  const scene::Description scene_ = Scene("press_table.yaml");
+  const kinematics::RobotDescription robot_;
+  const scene::Description scene_;
   ManualClock clock_;
   NullLog log_;
   ircp::MemoryBus bus_{clock_};
@@ -271,6 +276,95 @@ TEST_F(SessionRig, ARateAboveTheStepsIsAnError) {
   const auto session = Session::Create(bus_, clock_, log_, robot_, scene_, {.rate_hz = 2000});
   ASSERT_FALSE(session.ok());
   EXPECT_EQ(session.error().field, "rate-hz");
+}
+
+/// The arm with a hand, a block and a tray.
+class HandRig : public SessionRig {
+ protected:
+  HandRig() : SessionRig("arm7_hand", "carry_table.yaml") {}
+};
+
+TEST_F(HandRig, OpensAndClosesItsHandAsCommandedAndMeasuresIt) {
+  Begin(Leader::kCommand);
+  EXPECT_NEAR(state().hand_open, 1, 1e-3);
+  auto writer = *bus_.MakeWriter<ircp::JointCommandSample>("executor");
+  ircp::JointCommandSample close = CommandTo(robot_.home);
+  close.has_hand_open = true;
+  close.hand_open = 0.25;
+  Advance(10, [&] { ASSERT_TRUE(writer->Write(close).ok()); });
+  EXPECT_GT(state().hand_open, 0.5) << "it takes its time";
+  EXPECT_LT(state().hand_open, 0.9);
+  Advance(60, [&] { ASSERT_TRUE(writer->Write(close).ok()); });
+  EXPECT_NEAR(state().hand_open, 0.25, 0.02);
+  // Commands that say nothing of the hand leave it where it is.
+  Advance(60, [&] { ASSERT_TRUE(writer->Write(CommandTo(robot_.home)).ok()); });
+  EXPECT_NEAR(state().hand_open, 0.25, 0.02);
+}
+
+TEST_F(HandRig, FollowsAPersonsGloveWithTheSuit) {
+  Begin(Leader::kSuit);
+  auto glove = *bus_.MakeWriter<ircp::EndEffectorSample>("suit");
+  ircp::EndEffectorSample sample;
+  sample.has_pose = false;
+  ASSERT_TRUE(glove->Write(sample).ok());
+  Advance(30);
+  EXPECT_NEAR(state().hand_open, 1, 0.02) << "nothing was said of the hand";
+  sample.has_hand_open = true;
+  sample.hand_open = 0;
+  ASSERT_TRUE(glove->Write(sample).ok());
+  Advance(60);
+  EXPECT_NEAR(state().hand_open, 0, 0.02);
+}
+
+TEST_F(HandRig, TracksObjectsWithNoiseAtTheirRate) {
+  std::map<std::string, std::vector<Eigen::Vector3d>> seen;
+  std::size_t samples = 0;
+  auto reader = *bus_.MakeReader<ircp::ObjectSample>(
+      [&](const ircp::ObjectSample& sample, const ircp::Reception&) {
+        const std::lock_guard lock(mutex_);
+        seen[sample.name].push_back(sample.base_T_object.translation);
+        EXPECT_EQ(sample.frame, "base");
+        EXPECT_NEAR(std::sqrt(sample.position_variance_m2[0]), 0.002, 1e-12);
+        ++samples;
+        heard_.notify_all();
+      });
+  SessionOptions options;
+  options.track_hz = 62.5;
+  options.noise.object_m = 0.002;
+  Begin(Leader::kCommand, options);
+  Advance(250);
+  std::unique_lock lock(mutex_);
+  // Every 16 ms for two seconds.
+  ASSERT_TRUE(heard_.wait_for(lock, std::chrono::seconds(30), [&] { return samples >= 250; }));
+  ASSERT_EQ(seen.size(), 2u);
+  for (const auto& [name, places] : seen) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& place : places) mean += place / static_cast<double>(places.size());
+    double variance = 0;
+    for (const Eigen::Vector3d& place : places) {
+      variance += (place - mean).squaredNorm() / (3 * static_cast<double>(places.size()));
+    }
+    const scene::Object& object = name == "block" ? scene_.objects[0] : scene_.objects[1];
+    EXPECT_LT((mean - object.base_T_object.translation).norm(), 1e-3) << name;
+    EXPECT_NEAR(std::sqrt(variance), 0.002, 3e-4) << name;
+  }
+}
+
+TEST_F(HandRig, SaysWhereObjectsAreAndPutsThemElsewhere) {
+  Begin(Leader::kCommand);
+  const auto placed =
+      client_->Call("place", {{"object", "block"}, {"x", "0.6"}, {"y", "-0.3"}, {"z", "0.02"}},
+                    std::chrono::seconds(30));
+  ASSERT_TRUE(placed.ok()) << placed.error().message;
+  Advance(20);
+  EXPECT_THAT(values()["position.block"], HasSubstr("0.6"));
+  EXPECT_THAT(values()["position.tray"], HasSubstr("0.48"));
+  EXPECT_EQ(values()["hand_open"], "1.000");
+  const auto inside =
+      client_->Call("place", {{"object", "block"}, {"x", "0.6"}, {"y", "0"}, {"z", "-0.02"}},
+                    std::chrono::seconds(30));
+  ASSERT_FALSE(inside.ok());
+  EXPECT_THAT(inside.error().message, HasSubstr("another thing"));
 }
 
 }  // namespace
