@@ -5,6 +5,7 @@
 
 #include "exemplar/bus/codec.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/security/access.hpp"
 #include "gateway/foxglove/bridge.hpp"
 #include "gateway/foxglove/playback.hpp"
 #include "gateway/foxglove/scene_feed.hpp"
@@ -13,13 +14,30 @@
 namespace exemplar::gateway {
 namespace {
 
+foxglove::Permit PermitOf(std::shared_ptr<security::AccessFile> access) {
+  if (access == nullptr) return {};
+  return [access = std::move(access)](const http::Request& request) -> foxglove::Permission {
+    constexpr std::string_view kBearer = "Bearer ";
+    const std::string authorization = foxglove::AuthorizationOf(request);
+    if (!authorization.starts_with(kBearer)) return {false, false};
+    const std::string_view token = std::string_view(authorization).substr(kBearer.size());
+    const auto caller = access->Identify({.token = token});
+    if (!caller) return {false, false};
+    return {caller->roles.Has(security::Role::kObserve),
+            caller->roles.Has(security::Role::kAdminister)};
+  };
+}
+
 class Side final : public FoxgloveSide {
  public:
-  Side(TopicHub& hub, api::JsonCalls& calls, http::Server& server, const Clock& clock, Log& log)
+  Side(TopicHub& hub, api::JsonCalls& calls, http::Server& server, const Clock& clock, Log& log,
+       foxglove::Permit permit)
       : server_(server),
-        bridge_(foxglove::Bridge::Create(
-            hub, clock, log, foxglove::StationServices(calls),
-            {.name = "exemplar", .session = std::to_string(clock.Now().nanoseconds())})) {}
+        permit_(std::move(permit)),
+        bridge_(foxglove::Bridge::Create(hub, clock, log, foxglove::StationServices(calls),
+                                         {.name = "exemplar",
+                                          .session = std::to_string(clock.Now().nanoseconds()),
+                                          .permit = permit_})) {}
 
   ~Side() override { server_.Stop(); }
 
@@ -40,7 +58,8 @@ class Side final : public FoxgloveSide {
       if (Status added = server_.RouteWebSocket(path, bridge_->Endpoint()); !added) return added;
     }
     if (words.recordings.empty()) return {};
-    playback_ = foxglove::Playback::Create(clock, log, {.folder = words.recordings});
+    playback_ =
+        foxglove::Playback::Create(clock, log, {.folder = words.recordings, .permit = permit_});
     return server_.RouteWebSocket("/foxglove/recordings/{file}", playback_->Endpoint());
   }
 
@@ -48,6 +67,7 @@ class Side final : public FoxgloveSide {
 
  private:
   http::Server& server_;
+  const foxglove::Permit permit_;
   std::optional<kinematics::RobotDescription> robot_;
   std::unique_ptr<foxglove::Bridge> bridge_;
   std::unique_ptr<foxglove::SceneFeed> scene_;
@@ -57,13 +77,18 @@ class Side final : public FoxgloveSide {
 }  // namespace
 
 Result<std::unique_ptr<FoxgloveSide>> FoxgloveSide::Create(const ProgramOptions& words,
+                                                           const program::CommonOptions& common,
                                                            TopicHub& hub, api::JsonCalls& calls,
                                                            http::Server& server, const Clock& clock,
                                                            Log& log) {
-  auto side = std::make_unique<Side>(hub, calls, server, clock, log);
-  if (Status started = side->Start(words, hub, clock, log); !started) {
-    return started.error();
+  std::shared_ptr<security::AccessFile> access;
+  if (!common.server.access.empty()) {
+    auto opened = security::AccessFile::Open(common.server.access, clock, log);
+    if (!opened) return opened.error();
+    access = std::move(*opened);
   }
+  auto side = std::make_unique<Side>(hub, calls, server, clock, log, PermitOf(std::move(access)));
+  if (Status started = side->Start(words, hub, clock, log); !started) return started.error();
   return std::unique_ptr<FoxgloveSide>(std::move(side));
 }
 

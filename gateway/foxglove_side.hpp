@@ -13,14 +13,16 @@
 namespace exemplar::gateway {
 
 /// Foxglove on the gateway's HTTP server: live at / and /foxglove, recordings at
-/// /foxglove/recordings/NAME.mcap.
+/// /foxglove/recordings/NAME.mcap. Where there is an access file, for those of its tokens only.
 class FoxgloveSide {
  public:
   /// Adds its endpoints; before the server's start. All arguments outlive it; its destructor stops
   /// the server.
-  static Result<std::unique_ptr<FoxgloveSide>> Create(const ProgramOptions& words, TopicHub& hub,
-                                                      api::JsonCalls& calls, http::Server& server,
-                                                      const Clock& clock, Log& log);
+  static Result<std::unique_ptr<FoxgloveSide>> Create(const ProgramOptions& words,
+                                                      const program::CommonOptions& common,
+                                                      TopicHub& hub, api::JsonCalls& calls,
+                                                      http::Server& server, const Clock& clock,
+                                                      Log& log);
   virtual ~FoxgloveSide() = default;
   virtual std::vector<Metric> metrics() const = 0;
 };

@@ -79,8 +79,8 @@ int main(int argc, char** argv) {
     auto made = gateway::HttpSide::Create(words, common, **server, *log);
     if (!made) return program::Fail(kName, made.error());
     http = std::move(*made);
-    auto drawn =
-        gateway::FoxgloveSide::Create(words, **hub, http->calls(), http->server(), clock, *log);
+    auto drawn = gateway::FoxgloveSide::Create(words, common, **hub, http->calls(), http->server(),
+                                               clock, *log);
     if (!drawn) return program::Fail(kName, drawn.error());
     foxglove = std::move(*drawn);
     for (Metric& metric : http::MetricsOf(http->server())) figures.push_back(std::move(metric));

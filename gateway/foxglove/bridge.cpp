@@ -32,8 +32,14 @@ class HubBridge final : public Bridge {
   http::WebSocketEndpoint Endpoint() override {
     http::WebSocketEndpoint endpoint = core_.options.endpoint;
     endpoint.subprotocols = {kSdkV1, kWebSocketV1};
-    endpoint.open = [this](std::shared_ptr<http::WebSocket> socket) {
-      return OpenLiveSession(core_, std::move(socket));
+    endpoint.open =
+        [this](std::shared_ptr<http::WebSocket> socket) -> std::unique_ptr<http::WebSocketSession> {
+      Permission permission;
+      if (core_.options.permit) permission = core_.options.permit(socket->request());
+      if (permission.observe) return OpenLiveSession(core_, std::move(socket), permission);
+      ++core_.refused_clients;
+      socket->SendText(StatusText(StatusLevel::kError, kNotLetIn));
+      return nullptr;
     };
     return endpoint;
   }
@@ -55,7 +61,7 @@ class HubBridge final : public Bridge {
 
   Figures figures() const override {
     return {core_.clients,      core_.dropped,   core_.bad_messages, core_.calls,
-            core_.failed_calls, core_.published, core_.refused};
+            core_.failed_calls, core_.published, core_.refused,      core_.refused_clients};
   }
 
  private:
@@ -187,6 +193,8 @@ std::vector<Metric> MetricsOf(const Bridge& bridge) {
           counter("calls", "Service calls of Foxglove clients.", &Figures::calls),
           counter("failed_calls", "Service calls that failed.", &Figures::failed_calls),
           counter("published", "Samples published by Foxglove clients.", &Figures::published),
+          counter("refused_clients", "Foxglove clients without the role to observe.",
+                  &Figures::refused_clients),
           counter("refused", "Samples of Foxglove clients that were refused.", &Figures::refused)};
 }
 

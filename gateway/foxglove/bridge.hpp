@@ -25,12 +25,22 @@ struct Service {
       call;
 };
 
+/// What a connection may do beside calling services, which are judged call by call.
+struct Permission {
+  bool observe = true;
+  bool publish = true;  ///< where the hub lets anybody
+};
+
+/// Judges the request that a connection begins with; quick. Null: all may all.
+using Permit = std::function<Permission(const http::Request&)>;
+
 struct BridgeOptions {
   std::string name = "exemplar";
   std::string session;          ///< tells clients a restarted server from a broken connection
   bool simulated_time = false;  ///< tell clients the clock's time, which then is not theirs
   std::size_t calls = 8;        ///< of services at once
   http::WebSocketEndpoint endpoint = {};  ///< bounds; `subprotocols` and `open` are the bridge's
+  Permit permit = {};
 };
 
 /// A slow client misses messages, which are counted and told to it; it slows nobody. Thread-safe.
@@ -57,6 +67,7 @@ class Bridge {
     std::uint64_t failed_calls = 0;
     std::uint64_t published = 0;  ///< by clients
     std::uint64_t refused = 0;    ///< likewise
+    std::uint64_t refused_clients = 0;
   };
   virtual Figures figures() const = 0;
 };

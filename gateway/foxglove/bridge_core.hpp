@@ -50,6 +50,7 @@ struct BridgeCore {
   std::atomic<std::uint64_t> failed_calls{0};
   std::atomic<std::uint64_t> published{0};
   std::atomic<std::uint64_t> refused{0};
+  std::atomic<std::uint64_t> refused_clients{0};
 
   std::mutex mutex;  ///< of the next three
   Catalogue catalogue;
@@ -69,6 +70,7 @@ void MarkReady(BridgeCore& core, std::weak_ptr<Feed> feed);
 
 /// A client's session. The core outlives it.
 std::unique_ptr<http::WebSocketSession> OpenLiveSession(BridgeCore& core,
-                                                        std::shared_ptr<http::WebSocket> socket);
+                                                        std::shared_ptr<http::WebSocket> socket,
+                                                        Permission permission);
 
 }  // namespace exemplar::gateway::foxglove

@@ -11,10 +11,13 @@ constexpr std::size_t kMostClientChannels = 200;
 /// On the HTTP server's network thread.
 class LiveSession final : public http::WebSocketSession {
  public:
-  LiveSession(BridgeCore& core, std::shared_ptr<http::WebSocket> socket)
-      : core_(core), link_(std::make_shared<ClientLink>(std::move(socket))) {
+  LiveSession(BridgeCore& core, std::shared_ptr<http::WebSocket> socket, Permission permission)
+      : core_(core),
+        link_(std::make_shared<ClientLink>(std::move(socket))),
+        may_publish_(permission.publish) {
     ++core_.clients;
-    std::vector<std::string> capabilities = {"services", "clientPublish"};
+    std::vector<std::string> capabilities = {"services"};
+    if (may_publish_) capabilities.emplace_back("clientPublish");
     if (core_.options.simulated_time) capabilities.emplace_back("time");
     link_->SendText(ServerInfoText({.name = core_.options.name,
                                     .capabilities = std::move(capabilities),
@@ -105,6 +108,10 @@ class LiveSession final : public http::WebSocketSession {
   }
 
   void Do(const AdvertiseOp& op) {
+    if (!may_publish_) {
+      Refuse("you may not publish");
+      return;
+    }
     for (const AdvertiseOp::Channel& channel : op.channels) {
       if (channel.encoding != "cdr" && channel.encoding != "json") {
         Refuse("encoding \"" + channel.encoding + "\" is not one of cdr, json");
@@ -194,6 +201,7 @@ class LiveSession final : public http::WebSocketSession {
 
   BridgeCore& core_;
   const std::shared_ptr<ClientLink> link_;
+  const bool may_publish_;
   std::map<std::uint32_t, std::shared_ptr<Feed>> feeds_;  ///< by channel
   std::map<std::uint32_t, AdvertiseOp::Channel> advertised_;
 };
@@ -201,8 +209,9 @@ class LiveSession final : public http::WebSocketSession {
 }  // namespace
 
 std::unique_ptr<http::WebSocketSession> OpenLiveSession(BridgeCore& core,
-                                                        std::shared_ptr<http::WebSocket> socket) {
-  return std::make_unique<LiveSession>(core, std::move(socket));
+                                                        std::shared_ptr<http::WebSocket> socket,
+                                                        Permission permission) {
+  return std::make_unique<LiveSession>(core, std::move(socket), permission);
 }
 
 }  // namespace exemplar::gateway::foxglove

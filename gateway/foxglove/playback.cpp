@@ -281,6 +281,10 @@ class FolderPlayback final : public Playback {
     const auto& variables = socket->request().variables;
     const auto name = variables.find("file");
     const auto link = std::make_shared<ClientLink>(std::move(socket));
+    if (options_.permit && !options_.permit(link->socket().request()).observe) {
+      link->Say(StatusLevel::kError, kNotLetIn);
+      return nullptr;
+    }
     if (name == variables.end() || !IsRecordingName(name->second)) {
       link->Say(StatusLevel::kError, "this is no recording's name");
       return nullptr;

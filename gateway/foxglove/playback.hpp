@@ -7,6 +7,7 @@
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/http/server.hpp"
+#include "gateway/foxglove/bridge.hpp"
 
 namespace exemplar::gateway::foxglove {
 
@@ -14,6 +15,7 @@ struct PlaybackOptions {
   std::filesystem::path folder;           ///< whose *.mcap files may be played
   std::size_t players = 8;                ///< at once
   http::WebSocketEndpoint endpoint = {};  ///< bounds; the rest is the playback's
+  Permit permit = {};                     ///< who may watch: those who may observe
 };
 
 /// Nothing of it goes over the station's network: a recording's messages reach the client who

@@ -18,6 +18,9 @@ namespace exemplar::gateway::foxglove {
 
 inline constexpr const char* kWebSocketV1 = "foxglove.websocket.v1";
 inline constexpr const char* kSdkV1 = "foxglove.sdk.v1";
+/// What clients are told who may not look.
+inline constexpr const char* kNotLetIn =
+    "this needs a token of the role \"observe\": ?token=... behind the address";
 
 // ---------------------------------------------------------------- from clients
 

@@ -62,8 +62,8 @@ Error ErrorOf(const api::JsonFailure& failure) {
 Result<std::string> Call(api::JsonCalls& calls, const std::string& method, std::string_view request,
                          const http::Request& origin, std::stop_token stop) {
   api::JsonCall call{.method = method, .body = std::string(request), .stop = std::move(stop)};
-  if (const std::string* authorization = origin.headers.Find("Authorization")) {
-    call.metadata.emplace_back("authorization", *authorization);
+  if (std::string authorization = AuthorizationOf(origin); !authorization.empty()) {
+    call.metadata.emplace_back("authorization", std::move(authorization));
   }
   std::string last = "{}";
   const auto failure = calls.Call(call, [&last](std::string&& answer) {
@@ -75,6 +75,12 @@ Result<std::string> Call(api::JsonCalls& calls, const std::string& method, std::
 }
 
 }  // namespace
+
+std::string AuthorizationOf(const http::Request& request) {
+  if (const std::string* header = request.headers.Find("Authorization")) return *header;
+  const std::string* token = request.Query("token");
+  return token != nullptr ? "Bearer " + *token : std::string();
+}
 
 std::vector<Service> StationServices(api::JsonCalls& calls) {
   const Json document = Json::parse(calls.OpenApi(), nullptr, false);

@@ -14,4 +14,8 @@ namespace exemplar::gateway::foxglove {
 /// is its last message. `calls` outlives the services. docs/foxglove.md lists them.
 std::vector<Service> StationServices(api::JsonCalls& calls);
 
+/// "Bearer TOKEN" of a connection: its header, or ?token=TOKEN, since browsers give WebSockets no
+/// headers; empty when there is none.
+std::string AuthorizationOf(const http::Request& request);
+
 }  // namespace exemplar::gateway::foxglove

@@ -22,9 +22,10 @@ using Json = nlohmann::json;
 /// A client of the protocol that keeps what it gets.
 class Client {
  public:
-  explicit Client(int port, const std::string& subprotocol = kWebSocketV1, int receive_buffer = 0)
+  explicit Client(int port, const std::string& subprotocol = kWebSocketV1, int receive_buffer = 0,
+                  const std::string& path = "/")
       : socket_(port, receive_buffer) {
-    answer = socket_.Upgrade("/", "Sec-WebSocket-Protocol: " + subprotocol + "\r\n");
+    answer = socket_.Upgrade(path, "Sec-WebSocket-Protocol: " + subprotocol + "\r\n");
   }
   void Send(const Json& json) { socket_.SendFrame(0x81, json.dump()); }
   void SendText(const std::string& text) { socket_.SendFrame(0x81, text); }
@@ -274,6 +275,25 @@ TEST_F(BridgeTest, TellsSimulatedTime) {
   Client client(port());
   EXPECT_THAT(client.Await("serverInfo")["capabilities"], ::testing::Contains("time"));
   EXPECT_EQ("\x02" + client.AwaitBytes('\x02'), TimeBytes(clock_.Now()));
+}
+
+TEST_F(BridgeTest, LetsNobodyLookOrPublishWhoMayNot) {
+  BridgeOptions options;
+  options.permit = [](const http::Request& request) -> Permission {
+    const std::string authorization = AuthorizationOf(request);
+    return {authorization == "Bearer a b" || authorization == "Bearer look",
+            authorization == "Bearer a b"};
+  };
+  Make(std::move(options));
+  Client stranger(port());
+  EXPECT_THAT(stranger.Await("status")["message"].get<std::string>(), HasSubstr("token"));
+  Client publisher(port(), kSdkV1, 0, "/?token=a+b");
+  EXPECT_EQ(publisher.Await("serverInfo")["capabilities"], (Json{"services", "clientPublish"}));
+  Client looker(port(), kSdkV1, 0, "/?token=look");
+  EXPECT_EQ(looker.Await("serverInfo")["capabilities"], Json{"services"});
+  looker.Send({{"op", "advertise"}, {"channels", Json::array()}});
+  EXPECT_EQ(looker.Await("status")["message"], "you may not publish");
+  EXPECT_EQ(bridge_->figures().refused_clients, 1U);
 }
 
 TEST_F(BridgeTest, ForgetsClientsThatGo) {
