@@ -31,6 +31,7 @@ def parse(arguments):
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=pathlib.Path, default=ROOT / "build" / "demo")
     parser.add_argument("--headless", action="store_true")
+    parser.add_argument("--secured", action="store_true")
     parser.add_argument("--domain", type=int, default=77)
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
     options = parser.parse_args(arguments)
@@ -76,7 +77,7 @@ class Demo:
         self.options = options
         self.say = Narrator()
         shutil.rmtree(options.keep, ignore_errors=True)
-        self.system = System(options.bin, options.keep, options.domain, "demo")
+        self.system = System(options.bin, options.keep, options.domain, "demo", options.secured)
         self.recordings = options.keep / "recordings"
 
     # ---- what both forms share ----
@@ -87,33 +88,38 @@ class Demo:
         learning = self.system.start(
             "learning", "--data-dir", self.options.keep / "learning", "--robot", self.robot, server=True, bus=False
         )
-        self.learning = learning.address()
-        # Everything is asked at one address; the executor, which needs a learned skill, comes later.
+        self.recorder = recorder.address()
+        self.learning = self.skills = learning.address()
+
+    def start_gateway(self):
+        """From here on everything is asked at one address. Before this, captures begin once somebody reads what they
+        send, and that has to be the recorder and the robot."""
         self.executor_port = free_port()
         gateway = self.system.start(
-            "gateway", "--learning", self.learning, "--recorder", recorder.address(), "--executor", f"127.0.0.1:{self.executor_port}", server=True
+            "gateway", "--learning", self.learning, "--recorder", self.recorder, "--executor", f"127.0.0.1:{self.executor_port}", server=True
         )
-        self.server = gateway.address()
+        self.recorder = self.skills = self.executor = gateway.address()
 
     def submit_and_learn(self):
         files = sorted(self.recordings.glob("trial-*.mcap"))
         self.say.step(f"submitting {len(files)} recordings over gRPC")
-        submitted = self.system.cli(self.server, "trial", "submit", "--skill", SKILL, *files)
+        submitted = self.system.cli(self.skills, "trial", "submit", "--skill", SKILL, *files)
         for trial in submitted:
             for notice in trial.get("notices", []):
                 self.say.detail(f"{trial.get('source', trial.get('id'))}: {notice}")
         self.say.step("learning")
-        self.system.cli(self.server, "skill", "learn", SKILL)
-        self.say.detail(self.system.cli(self.server, "skill", "show", SKILL, "--format", "text", as_json=False))
+        self.system.cli(self.skills, "skill", "learn", SKILL)
+        self.say.detail(self.system.cli(self.skills, "skill", "show", SKILL, "--format", "text", as_json=False))
         return len(submitted)
 
     def skill(self):
-        return json.loads(self.system.cli(self.server, "skill", "export", SKILL, as_json=False))
+        return json.loads(self.system.cli(self.skills, "skill", "export", SKILL, as_json=False))
 
     def start_robot(self, scene, *simulator_options):
         self.simulator = self.system.start("simulator", "--robot", self.robot, "--scene", scene, *simulator_options)
 
     def start_executor(self, scene):
+        self.start_gateway()
         executor = self.system.start(
             "executor", "--robot", self.robot, "--scene", scene, "--learning", self.learning, server=True, port=self.executor_port
         )
@@ -127,16 +133,16 @@ class Demo:
             return None  # the gateway has not noticed yet that the executor is there
 
     def robot_status(self):
-        return self.system.cli(self.server, "robot", "status")
+        return self.system.cli(self.executor, "robot", "status")
 
     def record(self, action, *arguments):
-        return self.system.cli(self.server, "record", action, *arguments)
+        return self.system.cli(self.recorder, "record", action, *arguments)
 
     def execute(self, *arguments):
         self.say.step("planning and executing")
         self.record("start", "--name", "execution")
         try:
-            result = self.system.cli(self.server, "skill", "execute", SKILL, *arguments, "--wait")
+            result = self.system.cli(self.executor, "skill", "execute", SKILL, *arguments, "--wait")
         finally:
             self.record("stop")
         return result
@@ -228,7 +234,7 @@ class Demo:
         trials = self.submit_and_learn()
 
         self.say.step(f"querying at the object pose and start of {left_out.name}")
-        evaluation = self.system.cli(self.server, "skill", "evaluate", SKILL, left_out)
+        evaluation = self.system.cli(self.skills, "skill", "evaluate", SKILL, left_out)
         deviation = evaluation["deviation"]
         self.say.detail(
             f"the person's motion is {100 * deviation['frechet_m']:.2f} cm away (Fréchet), its end {100 * deviation['end_error_m']:.2f} cm"
@@ -273,7 +279,7 @@ class Demo:
         self.start_executor(scene)
         seen = wait_until("the vision program to see the button", self.seen_target, 20)
         self.say.detail("seen at " + numbers(seen))
-        answer = self.system.cli(self.server, "skill", "query", SKILL, "--object", "target=" + numbers(seen))
+        answer = self.system.cli(self.skills, "skill", "query", SKILL, "--object", "target=" + numbers(seen))
         execution = self.execute("--object", "target=" + numbers(seen))
         clicks = wait_until("the simulator's count of clicks", self.clicks, 5)
         picture.draw(self.options.keep / "result.svg", "a place no trial had", answer, execution, None, self.skill())
