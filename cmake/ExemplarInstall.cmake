@@ -14,8 +14,14 @@ install(DIRECTORY "${CMAKE_SOURCE_DIR}/idl" DESTINATION "${EXEMPLAR_SHARE}" COMP
 install(DIRECTORY "${CMAKE_SOURCE_DIR}/proto" DESTINATION "${EXEMPLAR_SHARE}" COMPONENT development
   FILES_MATCHING PATTERN "*.proto")
 foreach(component runtime-services clients development)
+  set(folder exemplar-${component})
+  if(component STREQUAL "runtime-services")
+    set(folder exemplar-services)
+  elseif(component STREQUAL "development")
+    set(folder libexemplar-dev)
+  endif()
   install(FILES "${CMAKE_SOURCE_DIR}/LICENSE" "${CMAKE_SOURCE_DIR}/CHANGELOG.md"
-    DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/exemplar-${component}" COMPONENT ${component})
+    DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/${folder}" COMPONENT ${component})
 endforeach()
 
 include(ExemplarPackages)

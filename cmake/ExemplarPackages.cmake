@@ -30,6 +30,7 @@ exemplar_unit(executor "carries motions out on the robot" AFTER exemplar-learnin
 exemplar_unit(capture-tactile "sends touch")
 exemplar_unit(capture-vision "finds objects in pictures")
 exemplar_unit(simulator "simulates a robot")
+exemplar_unit(gateway "one address for every service" AFTER exemplar-learning.service exemplar-recorder.service exemplar-executor.service)
 
 set(package_files "${CMAKE_BINARY_DIR}/package")
 get_property(conffiles GLOBAL PROPERTY EXEMPLAR_CONFFILES)

@@ -30,7 +30,8 @@ PLACES = ["0.46,-0.12", "0.40,-0.28", "0.52,-0.22", "0.36,-0.18"]
 NEW_PLACE = "0.45,-0.20"
 SERVERS = {"learning": "127.0.0.1:50051", "recorder": "127.0.0.1:50052", "executor": "127.0.0.1:50053"}
 LONG_RUNNING = ["recorder", "learning", "executor", "simulator", "capture-vision", "capture-tactile"]
-QUICK_LIMIT_S = 60  # for anything to work again; what it took is printed
+LIMIT_S = 150  # for anything to work again; what it took is printed
+STARTS = 5  # of a motion that a busy machine stops
 LOSSY = {"ircp/camera"}  # best effort by design
 
 FETCH = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:9464/metrics').read().decode())"
@@ -110,30 +111,35 @@ class ComposeTest(unittest.TestCase):
 
     def start_execution(self):
         """`skill execute --wait` in the background, once the robot moves."""
-        target = wait_for_value(self.target, "the button to be seen", QUICK_LIMIT_S)
-        command = ["nsenter", "-t", self.engine._first(), "-n", BINARIES / "exemplar", "--server", SERVERS["executor"], "--timeout", "60"]
+        target = wait_for_value(self.target, "the button to be seen", LIMIT_S)
+        command = ["nsenter", "-t", self.engine.first(), "-n", BINARIES / "exemplar", "--server", SERVERS["executor"], "--timeout", "60"]
         command += ["skill", "execute", "press", "--object", f"target={target}", "--wait", "--format", "json"]
-        process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for _ in range(STARTS):
+            process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            wait_for(lambda: process.poll() is not None or self.state() == "executing", "the robot to move", 30)
+            time.sleep(0.5)
+            if process.poll() is None and self.state() == "executing":
+                return process
+            _, error = process.communicate()
+            if self.state() != "protective_stop":
+                raise AssertionError(f"the execution ended with {process.returncode}: {error}")
+            self.cli("executor", "robot", "reset")
+        raise AssertionError(f"the robot did not get far in {STARTS} attempts: {error}")
 
-        def moves():
-            if process.poll() is not None:
-                raise AssertionError(f"the execution ended with {process.returncode}: {process.stderr.read()}")
-            return self.cli("executor", "robot", "status")["state"] == "executing"
-
-        wait_for(moves, "the robot to move", 30)
-        time.sleep(0.5)
-        return process
+    def state(self):
+        return self.cli("executor", "robot", "status")["state"]
 
     def execute(self):
-        target = wait_for_value(self.target, "the button to be seen", QUICK_LIMIT_S)
+        target = wait_for_value(self.target, "the button to be seen", LIMIT_S)
         return self.cli("executor", "skill", "execute", "press", "--object", f"target={target}", "--wait")
 
     def works_again(self, what, begin):
-        """The whole station: healthy, and it presses the button. What stopped the robot is reset, as an operator would."""
-        last = ""
+        """The whole station: healthy, and it presses the button. What stopped the robot is reset, as an operator would; on a machine
+        that is busy with other things it may stop again because the robot's state comes late."""
+        trouble = stops = 0
 
-        def well():
-            nonlocal last
+        def pressed():
+            nonlocal trouble, stops
             try:
                 if not self.station.healthy(*LONG_RUNNING):
                     return None
@@ -141,19 +147,23 @@ class ComposeTest(unittest.TestCase):
                 if status["state"] == "protective_stop":
                     self.cli("executor", "robot", "reset")
                     return None
-                return status if status["state_age_s"] < 0.5 and self.target() else None
+                if status["state_age_s"] > 0.5 or not self.target():
+                    return None
+                well = time.monotonic() - begin
+                return well, self.execute()
             except AssertionError as error:
-                last = str(error)
+                trouble = error
+                stops += "protective_stop" in str(error)
                 return None
 
-        deadline = time.monotonic() + QUICK_LIMIT_S
-        while not well():
-            self.assertLess(time.monotonic(), deadline, f"{what}: not well again: {last}\n{self.station.logs('executor')}")
+        deadline = time.monotonic() + LIMIT_S
+        while not (found := pressed()):
+            self.assertLess(time.monotonic(), deadline, f"{what}: does not work again: {trouble}\n{self.station.logs('executor')}")
             time.sleep(0.1)
-        recovered = time.monotonic() - begin
-        done = self.execute()
+        well, done = found
         self.assertEqual(done["state"], "done", done["detail"])
-        tell(f"{what}: well again after {recovered:.1f} s, then pressed in {done['tool_time_s'][-1]:.1f} s, tracking within {done['tracking_error_rad']:.3f} rad")
+        late = f" (after {stops} stops on the way)" if stops else ""
+        tell(f"{what}: works again after {well:.1f} s{late}, pressed in {done['tool_time_s'][-1]:.1f} s, tracking within {done['tracking_error_rad']:.3f} rad")
 
     def holds(self):
         """Whether the simulated robot, asked itself, moves nowhere."""
@@ -270,13 +280,15 @@ class ComposeTest(unittest.TestCase):
         filler = DISK / "filler"
         self.recorder("start", "--name", "squeezed")
         time.sleep(1)
-        self.engine.inside("sh", "-c", f"cat /dev/zero > {filler} 2>/dev/null; true")
-        time.sleep(4)
-        begin = time.monotonic()
-        full = self.recorder("status")
-        tell(f"disk full: recorder is {full['state']} ({full['detail']}), {full['disk_free_bytes']} bytes free, left out {full['left_out']}, lost {full['lost']}")
-        self.works_again("with the recorder's disk full", begin)  # nothing else depends on it
-        self.engine.inside("rm", filler)
+        try:
+            self.engine.inside("sh", "-c", f"cat /dev/zero > {filler} 2>/dev/null; true")
+            time.sleep(4)
+            begin = time.monotonic()
+            full = self.recorder("status")
+            tell(f"disk full: recorder is {full['state']} ({full['detail']}), {full['disk_free_bytes']} bytes free, left out {full['left_out']}, lost {full['lost']}")
+            self.works_again("with the recorder's disk full", begin)  # nothing else depends on it
+        finally:
+            self.engine.inside("rm", filler)
         begin = time.monotonic()
         with contextlib.suppress(AssertionError):  # where it gave the recording up by itself
             self.recorder("stop")

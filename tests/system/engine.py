@@ -65,7 +65,7 @@ class Engine:
     def __exit__(self, *_):
         if self.process.poll() is None:
             # unshare hands no signal on: its child does the work.
-            target = self._first() if self.alone else self.process.pid
+            target = self.first() if self.alone else self.process.pid
             if target:
                 subprocess.run(["kill", "-TERM", str(target)], check=False)
             try:
@@ -80,14 +80,14 @@ class Engine:
                 except OSError:
                     pass
 
-    def _first(self):
+    def first(self):
         """The process that holds the namespaces, or None while there is none."""
         children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text(encoding="ascii").split()
         return children[0] if children else None
 
     def inside(self, *words, **more):
         """Runs a command in the engine's namespaces; its output."""
-        return run("nsenter", "-t", self._first(), "-n", "-m", "-p", *words, **more)
+        return run("nsenter", "-t", self.first(), "-n", "-m", "-p", *words, **more)
 
     def docker(self, *words):
         return run("docker", *words, env=self.environment)

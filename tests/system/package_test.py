@@ -22,7 +22,7 @@ from engine import ROOT, Engine, run
 from processes import BINARIES, wait_for
 
 CACHE = pathlib.Path(os.environ.get("EXEMPLAR_DOCKER", ROOT / "build" / "docker"))
-UNITS = ["recorder", "learning", "executor", "capture-tactile", "capture-vision", "simulator"]
+UNITS = ["recorder", "learning", "executor", "capture-tactile", "capture-vision", "simulator", "gateway"]
 IMAGE = "exemplar/installed-packages:test"
 NAME = "exemplar-packages"
 
