@@ -75,6 +75,24 @@ TEST_F(StationTest, JointCommandsAreWrittenByTheExecutorsRoleAlone) {
   EXPECT_EQ(writers, 1);
 }
 
+/// "`ircp/suit` `ircp/clock`", or "none".
+std::string Cell(const std::vector<std::string_view>& topics) {
+  std::string text;
+  for (const std::string_view topic : topics) {
+    text += (text.empty() ? "`" : " `") + std::string(topic) + "`";
+  }
+  return text.empty() ? "none" : text;
+}
+
+TEST_F(StationTest, TheDocumentationSaysWhatEachRoleMayDo) {
+  const std::string page = Text(fs::path(EXEMPLAR_SOURCE_DIR) / "docs/security.md");
+  for (const StationRole& role : StationRoles()) {
+    const std::string row = "| `" + std::string(role.name) + "` | " + Cell(role.writes) + " | " +
+                            Cell(role.reads) + " | " + ToText(role.calls) + " |";
+    EXPECT_THAT(page, HasSubstr(row));
+  }
+}
+
 TEST_F(StationTest, SecretsAreReadableByTheirOwnerAlone) {
   const fs::path member = Issue("executor", "executor");
   for (const fs::path& file :
