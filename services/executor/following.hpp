@@ -28,7 +28,7 @@ struct FollowingOptions {
   /// Not seen for so long: lost.
   Duration lost_patience = std::chrono::milliseconds(500);
   /// From one full plan's begin to the next one's, at least.
-  Duration plan_again = std::chrono::milliseconds(250);
+  Duration plan_again = std::chrono::milliseconds(150);
   /// At the contact the target may be so far from where the motion can be led.
   double largest_miss_m = 0.012;
   /// From a command to the robot's being there.

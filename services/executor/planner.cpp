@@ -142,6 +142,7 @@ Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
   const auto [closed, open] = std::minmax_element(motion.hand_open.begin(), motion.hand_open.end());
   if (!motion.hand_open.empty() && *open - *closed > kGrasp) {
     options.touch_margin_m = std::max(options.touch_margin_m, kGraspMargin_m);
+    guard = false;  // what it goes to is taken, not pressed
   }
   std::vector<std::string> warnings = motion.warnings;
   std::vector<GuardZone> zones;
