@@ -12,6 +12,7 @@
 #include "exemplar/rpc/metadata.hpp"
 #include "health_watch.hpp"
 #include "relay.hpp"
+#include "tls.hpp"
 
 namespace exemplar::rpc {
 namespace {
@@ -97,6 +98,9 @@ Result<std::unique_ptr<Proxy>> Proxy::Create(ServerShared& shared,
     auto link = std::make_unique<BackendLink>();
     link->name = backend.name;
     link->connection = std::move(*connection);
+    const std::string& server = backend.connection.server;
+    link->may_hear_secrets = !backend.connection.credentials.ca.empty() ||
+                             IsLoopback(std::string_view(server).substr(0, server.rfind(':')));
     link->speaks_for_others = !backend.connection.credentials.certificate.empty();
     for (const std::string& service : backend.services) {
       if (!proxy->by_service_.emplace(service, link.get()).second) {
@@ -221,13 +225,14 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Proxy::Relay(
   return StartRelay(context, {.method = "/" + std::string(method),
                               .connection = link.connection,
                               .metadata = std::move(metadata),
-       .stop = shared_.shutdown().get_token(),
+                              .pass_authorization = link.may_hear_secrets,
+                              .stop = shared_.shutdown().get_token(),
                               .translate =
                                   [this, &link](const grpc::Status& status) {
-             if (status.error_code() == grpc::StatusCode::CANCELLED &&
-                 shared_.shutdown().stop_requested()) {
-               return ToGrpc(Unavailable("the server is shutting down"));
-             }
+                                    if (status.error_code() == grpc::StatusCode::CANCELLED &&
+                                        shared_.shutdown().stop_requested()) {
+                                      return ToGrpc(Unavailable("the server is shutting down"));
+                                    }
                                     // What gRPC itself says of a connection has no details; servers
                                     // of ours give some.
                                     if (status.error_code() != grpc::StatusCode::UNAVAILABLE ||

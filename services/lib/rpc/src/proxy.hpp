@@ -26,6 +26,7 @@ class RelayedService;
 struct BackendLink {
   std::string name;
   std::shared_ptr<Connection> connection;  ///< shared with the calls under way
+  bool may_hear_secrets = false;           ///< over TLS, or on this machine
   bool speaks_for_others = false;          ///< we have a certificate to show it
 
   /// "executor (127.0.0.1:40001)".

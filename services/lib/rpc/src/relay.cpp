@@ -19,7 +19,7 @@ bool StaysBehind(std::string_view name) {
          name == "content-type" || name == "te" || name == "host" || name == kForWhomKey;
 }
 
-std::string ToText(grpc::string_ref text) { return {text.data(), text.size()}; }
+std::string ToText(const grpc::string_ref& text) { return {text.data(), text.size()}; }
 
 class Refused final : public RelayReactor {
  public:
@@ -37,6 +37,7 @@ class Relay final : public RelayReactor {
     for (const auto& [name, value] : context_.client_metadata()) {
       const std::string key = ToText(name);
       if (StaysBehind(key) || options_.metadata.count(key) != 0) continue;
+      if (key == kAuthorizationKey && !options_.pass_authorization) continue;
       backend_context_->AddMetadata(key, ToText(value));
     }
     for (const auto& [name, value] : options_.metadata) backend_context_->AddMetadata(name, value);

@@ -21,6 +21,7 @@ struct RelayOptions {
   std::shared_ptr<Connection> connection;  ///< outlives the call
   /// Sent beside what the caller sent, and instead of it where the name is the same.
   std::map<std::string, std::string> metadata;
+  bool pass_authorization = true;
   std::stop_token stop;  ///< cancels the call
   /// What the caller gets, of what the backend said.
   std::function<grpc::Status(const grpc::Status&)> translate;
