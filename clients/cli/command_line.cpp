@@ -112,6 +112,15 @@ const CLI::App* FindCommand(const CLI::App* app, const std::string& word) {
   return nullptr;
 }
 
+/// What a value of this kind names, as --help shows it.
+Names NamesOf(const std::string& type) {
+  if (type == "FILE" || type == "FILE|ID") return Names::kFiles;
+  if (type == "DIR") return Names::kFolders;
+  if (type == "ID") return Names::kTrials;
+  if (type == "TOPIC") return Names::kTopics;
+  return Names::kNothing;
+}
+
 /// Without what follows the first sentence or line.
 std::string Brief(const std::string& help) { return help.substr(0, help.find('\n')); }
 
@@ -154,32 +163,32 @@ Command Command::Add(const std::string& name, const std::string& summary,
 
 Command& Command::Argument(const std::string& name, std::string& value, const std::string& help) {
   last_ = app_->add_option(name, value, help)->required()->type_name("");
-  return *this;
+  return Completes(NamesOf(name));
 }
 
 Command& Command::OptionalArgument(const std::string& name, std::string& value,
                                    const std::string& help) {
   last_ = app_->add_option(name, value, help)->type_name("");
-  return *this;
+  return Completes(NamesOf(name));
 }
 
 Command& Command::Arguments(const std::string& name, std::vector<std::string>& values,
                             const std::string& help) {
   last_ = app_->add_option(name, values, help)->required()->type_name("");
-  return *this;
+  return Completes(NamesOf(name));
 }
 
 Command& Command::OptionalArguments(const std::string& name, std::vector<std::string>& values,
                                     const std::string& help) {
   last_ = app_->add_option(name, values, help)->type_name("");
-  return *this;
+  return Completes(NamesOf(name));
 }
 
 Command& Command::Option(const std::string& name, const std::string& type, std::string& value,
                          const std::string& help) {
   last_ = app_->add_option(name, value, help)->type_name(type);
   if (!value.empty()) last_->capture_default_str();
-  return *this;
+  return Completes(NamesOf(type));
 }
 
 Command& Command::Option(const std::string& name, const std::string& type,
@@ -200,7 +209,7 @@ Command& Command::Option(const std::string& name, const std::string& type,
               ->type_name(type)
               ->expected(1)
               ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  return *this;
+  return Completes(NamesOf(type));
 }
 
 Command& Command::Flag(const std::string& name, bool& value, const std::string& help) {

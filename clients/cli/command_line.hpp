@@ -62,6 +62,7 @@ class Command {
   Command& Required();
   Command& OneOf(const std::vector<std::string>& choices);
   Command& FromEnvironment(const std::string& variable);
+  /// Where the value's type ("FILE", "DIR", "ID", "TOPIC") does not say it.
   Command& Completes(Names names);
 
   /// What the command does: returns the exit code.

@@ -175,7 +175,7 @@ void AddMotionCommands(Command& skill, const Session& session) {
       "standard error). Warnings go to stderr; in JSON they are part of the answer.",
       {"exemplar skill query press --object button=0.45,-0.2,0.06 --output motion.csv",
        "exemplar skill query press --object button=0.45,-0.2,0.06,0,0,0,1 --start 0.3,0,0.3"});
-  command.Argument("NAME", words->name, "of the skill");
+  command.Argument("NAME", words->name, "of the skill").Completes(Names::kSkills);
   AddObjects(command, *words, "");
   command.Option("--start", "x,y,z[,qx,qy,qz,qw]", words->start,
                  "tool pose now (default: the trials' mean)");
@@ -190,7 +190,7 @@ void AddMotionCommands(Command& skill, const Session& session) {
                       "Compares a skill's answer with what a person did in a trial that it was not "
                       "learned from",
                       {"exemplar skill evaluate press left-out.csv"});
-  command.Argument("NAME", words->name, "of the skill");
+  command.Argument("NAME", words->name, "of the skill").Completes(Names::kSkills);
   command.Argument("FILE", words->file, "trial, CSV or MCAP");
   command.Option("--version", "N", words->version, "which version (default: the current one)");
   AddFormat(command, words->format, {"text", "json"});
@@ -204,7 +204,7 @@ void AddMotionCommands(Command& skill, const Session& session) {
       "returns once the robot moves. Exit code 4 when the motion is refused or aborted.",
       {"exemplar skill execute press --object button=0.45,-0.2,0.06 --wait",
        "exemplar skill execute press --wait --speed 0.5"});
-  command.Argument("NAME", words->name, "of the skill");
+  command.Argument("NAME", words->name, "of the skill").Completes(Names::kSkills);
   AddObjects(command, *words, " (default: where the objects are seen)");
   command.Option("--start", "x,y,z,qx,qy,qz,qw", words->start,
                  "go there first (default: from where the tool is)");

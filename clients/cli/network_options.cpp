@@ -15,10 +15,8 @@ void AddNetworkOptions(Command& command, NetworkWords& words) {
                  "machine sought beside multicast; several times");
   command.Option("--discovery-server", "HOST:PORT", words.discovery_servers,
                  "instead of multicast; several times");
-  command
-      .Option("--security", "DIR", words.security,
-              "folder that `exemplar security issue` made: authenticated, encrypted topics")
-      .Completes(Names::kFolders);
+  command.Option("--security", "DIR", words.security,
+                 "folder that `exemplar security issue` made: authenticated, encrypted topics");
 }
 
 Result<bus::ParticipantOptions> NetworkOf(const NetworkWords& words, const std::string& name) {

@@ -143,7 +143,7 @@ int Export(const Session& session, const Words& words) {
 Command AddOne(Command& skill, const std::string& name, const std::string& summary,
                const std::vector<std::string>& examples, const std::shared_ptr<Words>& words) {
   Command command = skill.Add(name, summary, examples);
-  command.Argument("NAME", words->name, "of the skill");
+  command.Argument("NAME", words->name, "of the skill").Completes(Names::kSkills);
   return command;
 }
 

@@ -184,7 +184,9 @@ void AddTrialCommands(Command& root, const Session& session) {
       "trial twice in one skill is one trial.",
       {"exemplar trial submit --skill press trial1.csv trial2.csv",
        "exemplar trial submit --skill press recordings/*.mcap --format json"});
-  command.Option("--skill", "NAME", submit->skill, "the skill that the trials show").Required();
+  command.Option("--skill", "NAME", submit->skill, "the skill that the trials show")
+      .Required()
+      .Completes(Names::kSkills);
   command.Arguments("FILE", submit->files, "CSV or MCAP");
   AddFormat(command, submit->format, {"text", "json"});
   command.Runs([&session, submit] { return Submit(session, *submit); });
@@ -196,7 +198,7 @@ void AddTrialCommands(Command& root, const Session& session) {
   const auto list = std::make_shared<Words>();
   command = trial.Add("list", "Lists the trials of a skill, or of all",
                       {"exemplar trial list --skill press"});
-  command.Option("--skill", "NAME", list->name, "only this skill's");
+  command.Option("--skill", "NAME", list->name, "only this skill's").Completes(Names::kSkills);
   AddFormat(command, list->format, {"text", "json"});
   command.Runs([&session, list] { return List(session, list->name, list->format); });
 

@@ -64,14 +64,20 @@ class Source {
   api::TopicApi* topics_ = nullptr;
 };
 
+constexpr Duration kAgain = std::chrono::milliseconds(100);
+
+/// How long topics are waited for that nobody writes yet.
+Duration PatienceOf(const Words& words) {
+  constexpr double kDefaultWaitS = 4;
+  return FromSeconds(words.wait_s.value_or(kDefaultWaitS));
+}
+
 bool IsPattern(const std::string& topic) { return topic.find('*') != std::string::npos; }
 
 /// Waits until each topic that is named is there; kNotFound, with the name that may be meant, for
 /// one that does not come.
 Status WaitForTopics(Source& source, const Words& words, const std::stop_token& stop) {
-  constexpr double kDefaultWaitS = 3;
-  constexpr Duration kAgain = std::chrono::milliseconds(100);
-  const Duration end = source.clock().Steady() + FromSeconds(words.wait_s.value_or(kDefaultWaitS));
+  const Duration end = source.clock().Steady() + PatienceOf(words);
   for (const std::string& topic : words.topics) {
     if (IsPattern(topic)) continue;
     for (;;) {
@@ -125,8 +131,16 @@ int WatchTable(Source& source, const Words& words, const std::stop_token& stop) 
   const Duration interval = FromSeconds(words.interval_s.value_or(1));
   LiveText screen;
   double left = words.count.value_or(0);
-  // Of topics that are there already, the first rates come after a second.
-  if (!source.clock().SleepFor(interval, stop)) return 0;
+  // On the network itself, topics come up one after the other, and their first rates a second
+  // later.
+  constexpr Duration kFirstRates = std::chrono::milliseconds(1200);
+  const Duration end = source.clock().Steady() + PatienceOf(words);
+  for (auto topics = source.topics().List(words.topics);
+       topics && topics->empty() && source.clock().Steady() < end;
+       topics = source.topics().List(words.topics)) {
+    if (!source.clock().SleepFor(kAgain, stop)) return 0;
+  }
+  if (!source.clock().SleepFor(std::max(interval, kFirstRates), stop)) return 0;
   for (;;) {
     const auto topics = source.topics().List(words.topics);
     if (!topics) return stop.stop_requested() ? 0 : Fail(topics.error());
@@ -229,16 +243,15 @@ void AddWatchCommand(Command& root, const Session& session) {
       "names;\nwithout one, or with --domain or --station, on the network itself",
       {"exemplar watch", "exemplar watch ircp/joint_state --rate 2 --format json",
        "exemplar watch --domain 3 --station lab 'ircp/*'"});
-  command
-      .OptionalArguments("TOPIC", words->topics, "whose samples are shown; * stands for any text")
-      .Completes(Names::kTopics);
+  command.OptionalArguments("TOPIC", words->topics,
+                            "whose samples are shown; * stands for any text");
   command.Option("--count", "N", words->count,
                  "ends after so many samples, or updates of the table (default: never)");
   command.Option("--interval", "SECONDS", words->interval_s,
                  "between two updates of the table (default: 1)");
   command.Option("--rate", "HZ", words->rate_hz, "at most so many samples of each writer");
   command.Option("--wait", "SECONDS", words->wait_s,
-                 "how long to wait for a topic that nobody writes yet (default: 3)");
+                 "how long to wait for a topic that nobody writes yet (default: 4)");
   AddNetworkOptions(command, words->network);
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] { return Watch(session, *words); });

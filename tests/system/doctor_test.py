@@ -126,7 +126,7 @@ class HealthyTest(Case):
         self.assertEqual(len(shown[0]["sample"]["positions"]), 7)
         self.assertGreater(shown[1]["sequence"], shown[0]["sequence"])
 
-        wrong = run("watch", "ircp/joint_stat", *HERE, "--wait", 1)
+        wrong = run("watch", "ircp/joint_stat", *HERE)
         self.assertEqual(wrong.returncode, 3)
         self.assertIn('did you mean "ircp/joint_state"?', wrong.stderr)
 

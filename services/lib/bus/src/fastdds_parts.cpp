@@ -10,7 +10,6 @@
 #include <ifaddrs.h>
 #include <netinet/in.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -257,13 +256,7 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
   qos.name(options.name);
   if (Status secured = Secure(options, qos); !secured.ok()) return secured.error();
   // Told to all who discover it, for `exemplar doctor`.
-  char host[256] = {};
-  ::gethostname(host, sizeof host - 1);
-  for (const auto& [name, value] :
-       {std::pair<std::string, std::string>{"exemplar.version", EXEMPLAR_VERSION},
-        {"exemplar.host", host}}) {
-    qos.properties().properties().emplace_back(name, value, true);
-  }
+  qos.properties().properties().emplace_back("exemplar.version", EXEMPLAR_VERSION, true);
   rtps::DiscoverySettings& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(kLeaseSeconds, 0);
   discovery.leaseDuration_announcementperiod =

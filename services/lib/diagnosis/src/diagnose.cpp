@@ -148,13 +148,13 @@ class Judge {
            Listed(names) + (names.size() == 1 ? " talks" : " talk") +
                " only to participants with an identity, and " + Listed(open_names) +
                (open_names.size() == 1 ? " has" : " have") + " none: they never match",
-           "Start all with --dds-security, or none.", open_names);
+           "Start all with --security, or none.", open_names);
     }
     if (!evidence_.secured) {
       Tell(Severity::kNote, "security",
            "what " + Listed(names) +
                " reads and writes is not shown to an observer without identity",
-           "Give the doctor an identity with --dds-security.", names);
+           "Give the doctor an identity with --security.", names);
     }
   }
 

@@ -75,7 +75,8 @@ class EndpointJudge {
   }
 
   void JudgePair(const SeenEndpoint& writer, const SeenEndpoint& reader) {
-    if (writer.domain != reader.domain || !PartitionsMeet(writer.partitions, reader.partitions)) {
+    if (writer.participant == reader.participant || writer.domain != reader.domain ||
+        !PartitionsMeet(writer.partitions, reader.partitions)) {
       return;
     }
     const std::string& from = names_.Of(writer.participant);
