@@ -9,7 +9,7 @@ import pytest
 
 import exemplar
 import processes
-from conftest import ROBOT, ROOT, Station
+from conftest import ROOT, Station
 
 STATE = "ircp/joint_state"
 
@@ -19,7 +19,7 @@ def gateway(station: Station) -> Iterator[exemplar.Client]:
     """Beside a robot that tells its state."""
     if not (processes.BINARIES / "exemplar-gateway").exists():
         pytest.skip("there is no gateway")
-    station.programs.start("exemplar-reference-driver", "--robot", ROBOT)
+    station.executor()
     address = station._server("gateway", "--learning", station.learning(), "--publish", "ircp/objects")
     with exemplar.Client(address) as client:
         processes.wait_for(lambda: client.topics.list(STATE), STATE)
