@@ -37,6 +37,9 @@ std::vector<Metric> MetricsOf(const Session& session) {
                           &Figures::pictures_skipped));
   metrics.push_back(GaugeOf(prefix + "_time_seconds", "Simulated time",
                             [&session] { return session.figures().time_s; }));
+  metrics.push_back(GaugeOf(prefix + "_time_stands",
+                            "1 while the simulated time stands until somebody commands the robot",
+                            [&session] { return session.figures().stands ? 1 : 0; }));
   metrics.push_back(GaugeOf(prefix + "_touch_newtons", "Force on the finger",
                             [&session] { return session.figures().touch_n; }));
   return metrics;

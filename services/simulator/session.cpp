@@ -211,11 +211,13 @@ class RunningSession final : public Session {
     if (options_.stand_after == Duration(0)) return true;
     if (world_.time() - last_arrival_ < options_.stand_after) return true;
     std::unique_lock lock(inbox_mutex_);
+    stands_.store(true);
     while (!arrived_.wait_for(lock, stop, kSayAgain, [this] { return !inbox_.empty(); })) {
       lock.unlock();
       if (!lead()) return false;  // who came later hears the time as well
       lock.lock();
     }
+    stands_.store(false);
     lock.unlock();
     return lead();
   }
@@ -258,6 +260,7 @@ class RunningSession final : public Session {
     }
     const std::lock_guard lock(mutex_);
     now.time_s = ToSeconds(world_.time());
+    now.stands = stands_.load();
     now.mode = NameOf(follower_.mode());
     now.touch_n = world_.touch_n();
     now.hand_open = world_.has_hand() ? world_.hand_open() : hand_open_;
@@ -536,7 +539,8 @@ class RunningSession final : public Session {
   std::unique_ptr<Outbox<ircp::ObjectSample>> tracked_;
   Follower::Mode said_mode_ = Follower::Mode::kHolding;  ///< of the outbox's thread
   std::unique_ptr<ircp::TimeLeader> time_;  ///< null: the world keeps pace with the clock
-  std::atomic<bool> is_leading_{false};     ///< time_ stands
+  std::atomic<bool> is_leading_{false};     ///< there is time_
+  std::atomic<bool> stands_{false};
   // Last: their threads call into what stands above.
   std::unique_ptr<ircp::ControlServer> control_;
   std::unique_ptr<ircp::Reader> leader_reader_, glove_reader_;

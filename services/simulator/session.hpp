@@ -70,8 +70,9 @@ inline constexpr const char* kTouchSensor = "finger";
 
 /// How it goes.
 struct Figures {
-  double time_s = 0;  ///< simulated
-  std::string mode;   ///< "holding", "following", "going home"
+  double time_s = 0;    ///< simulated
+  bool stands = false;  ///< time does, until somebody commands the robot
+  std::string mode;     ///< "holding", "following", "going home"
   double touch_n = 0;
   double hand_open = 1;
   std::map<std::string, std::uint64_t> clicks;  ///< by button
