@@ -232,7 +232,7 @@ def main():
     parser.add_argument("--robots", default=",".join(REGIONS), help="some of them, separated by commas")
     parser.add_argument("--presses", type=int, default=100, help="a robot")
     parser.add_argument("--wide", type=float, default=1, help="so many times as wide and deep as where the person pressed")
-    parser.add_argument("--guard-touch-n", type=float, default=0, help="as the executor's: presses end by touch; 0: by position alone")
+    parser.add_argument("--guard-touch-n", type=float, default=8, help="as the executor's: presses end by touch; 0: by position alone")
     parser.add_argument("--pace", type=float, default=1, help="simulated seconds a second, in step; 1: by the machine's clock; 0: as many as can be")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--domain", type=int, default=93)

@@ -329,6 +329,48 @@ TEST_F(MotionRunTest, SaysWhenTheTouchIsTooStrong) {
   EXPECT_NE(wrong->find("200.0 N"), std::string::npos) << *wrong;
 }
 
+/// A post stands 20 mm beside the tool, where the first joint's turning takes it.
+TEST(Monitor, SlowsDownOnlyWhileBodiesApproach) {
+  const kinematics::RobotDescription robot = Arm();
+  const motion::PlannedMotion plan = Swing(robot, 2);
+  Eigen::VectorXd turned = robot.home;
+  turned[0] += 0.01;
+  const Eigen::Vector3d tip = robot.chain.ToolPose(robot.home).translation;
+  const Eigen::Vector3d way = robot.chain.ToolPose(turned).translation - tip;
+  const Eigen::VectorXd home = kinematics::FullJointVector(robot.model, robot.chain, robot.home);
+  std::optional<collision::CollisionChecker> checker;
+  for (double ahead_m = 0.03; !checker && ahead_m < 0.3; ahead_m += 0.001) {
+    collision::Scene scene;
+    scene.objects.push_back({"post",
+                             geometry::Pose::FromTranslation(tip + ahead_m * way.normalized()),
+                             kinematics::Sphere{0.01}});
+    checker = *collision::CollisionChecker::Create(robot.model, std::move(scene));
+    if (checker->SmallestClearance(home).distance_m < 0.02) checker.reset();
+  }
+  ASSERT_TRUE(checker.has_value());
+
+  Monitor monitor(robot, plan, *std::move(checker), {});
+  Measurement now;
+  now.commanded = robot.home;
+  now.state.received = std::chrono::seconds(1);
+  const auto move = [&](double tool_m_s) {
+    now.commanded[0] += 0.01 * tool_m_s * kPeriod_s / way.norm();
+    now.state.joints = now.commanded;
+    now.state.received += FromSeconds(kPeriod_s);
+    now.elapsed_s += kPeriod_s;
+    const std::optional<std::string> wrong = monitor.Observe(now);
+    EXPECT_FALSE(wrong.has_value()) << *wrong;
+    return monitor.speed_share();
+  };
+  for (int state = 0; state < 10; ++state) EXPECT_EQ(move(1e-7), 1) << "near, and at rest";
+  double share = 1;
+  for (int state = 0; state < 12; ++state) share = move(0.12);
+  EXPECT_LT(share, 0.6);
+  EXPECT_GE(share, 0.1);
+  for (int state = 0; state < 10; ++state) share = move(-0.12);
+  EXPECT_EQ(share, 1) << "still near, but parting";
+}
+
 TEST(Lateness, QuantilesAreWithinABinOfTheTruth) {
   LatenessHistogram histogram;
   for (int i = 1; i <= 1000; ++i) histogram.Add(std::chrono::microseconds(i));
