@@ -35,6 +35,9 @@ struct FollowingOptions {
   Duration servo_lag = std::chrono::milliseconds(20);
   /// The motion begins so much later at most, so that the target does not turn back in the touch.
   double longest_wait_s = 8;
+  /// A target that was seen to turn at one end is watched for so long at most until it turned at
+  /// the other.
+  double longest_watch_s = 12;
 };
 
 /// A plan that meets a moving target.

@@ -16,6 +16,8 @@ constexpr double kCalmBefore_s = 0.5;
 constexpr double kCalmAfter_s = 0.2;
 constexpr double kWaitStep_s = 0.1;
 constexpr int kRounds = 5;
+/// Between two looks at a target whose way is not known yet.
+constexpr Duration kLook = std::chrono::milliseconds(50);
 
 }  // namespace
 
@@ -92,6 +94,13 @@ Result<FollowingPlan> FollowingPlanner::Plan(const api::ExecuteRequest& request,
                                              const std::stop_token& stop) const {
   Result<std::string> target = planner_.TargetOf(request);
   if (!target.ok()) return target.error();
+  const Duration watched_until = clock_.Steady() + FromSeconds(options_.longest_watch_s);
+  for (auto seen = Seen(*target); seen.ok() && seen->first.turning_points() == 1;
+       seen = Seen(*target)) {
+    if (clock_.Steady() >= watched_until) break;
+    if (!clock_.SleepFor(kLook, stop))
+      return Error{ErrorCode::kCancelled, "planning was cancelled"};
+  }
   double contact_s = kGuess_s;
   double release_s = kGuess_s + 1;
   std::vector<double> frame_time_s;

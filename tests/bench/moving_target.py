@@ -3,7 +3,7 @@
 Real programs (learning, executor, simulator), a fresh simulator and executor a press, the simulated time in step with
 the executor. A skill is learned from a person's presses of a button that stands; then the button runs to and fro on a
 rail, at a random place, in a random direction across the table, tracked at 60 Hz with half a millimetre of noise, and
-`skill execute --follow` presses it. A press counts when the button clicks in the simulator.
+`skill execute --follow` presses it once the cart was there and back. A press counts when the button clicks in the simulator.
 
     tests/system/run_isolated python3 tests/bench/moving_target.py --bin build/release/bin --presses 5
 
@@ -29,7 +29,7 @@ from processes import Failure, System, wait_until  # noqa: E402
 from workspace import REGIONS, SKILL, TRIALS, Place, scene_for, write_trial  # noqa: E402
 
 SPEEDS_M_S = (0.0, 0.05, 0.1, 0.2)
-RAIL_M = 0.4
+RAIL_M = 0.3
 # Where the middle of the rail is (m, base frame), and how far its direction is turned from the table's y.
 MIDDLE = ((0.45, 0.6), (-0.12, 0.02), (0.04, 0.08))
 LARGEST_TURN_RAD = 0.3
@@ -95,7 +95,8 @@ class Bench:
             executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, "--clock", "network", "--log-level", "debug", server=True)
             address = executor.address()
             wait_until("the robot's joint state", lambda: system.cli(address, "robot", "status").get("joint_names"), 20)
-            time.sleep((2 + rng.uniform(0, self.options.watch_s)) / max(self.options.pace, 1))
+            there_and_back_s = 2 * RAIL_M / speed if speed > 0 else 0
+            time.sleep((there_and_back_s + 1 + rng.uniform(0, self.options.watch_s)) / max(self.options.pace, 1))
             done, detail = {}, ""
             try:
                 done = system.cli(address, "skill", "execute", SKILL, "--follow", "--wait")
@@ -117,7 +118,7 @@ def main():
     parser.add_argument("--speeds", type=lambda text: [float(word) for word in text.split(",")], default=list(SPEEDS_M_S), help="m/s, separated by commas")
     parser.add_argument("--presses", type=int, default=25, help="a speed")
     parser.add_argument("--noise-m", type=float, default=0.0005, help="standard deviation of the tracker, an axis")
-    parser.add_argument("--watch-s", type=float, default=6, help="the cart runs for two seconds and up to so many before")
+    parser.add_argument("--watch-s", type=float, default=3, help="the cart runs there and back, one second more, and up to so many before")
     parser.add_argument("--pace", type=float, default=1, help="simulated seconds a second")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--domain", type=int, default=94)
