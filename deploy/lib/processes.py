@@ -72,18 +72,59 @@ class Process:
         return self._process.returncode == 0
 
 
+class Secured:
+    """A station's certificates and permissions, made by `exemplar security`, and what each program is told of them."""
+
+    ROLES = {"simulator": "robot", "capture-suit": "capture", "capture-vision": "capture", "capture-tactile": "capture"}
+    SERVERS = ("recorder", "learning", "executor", "gateway")
+    CLIENTS = ("executor", "gateway")
+
+    def __init__(self, exemplar, folder, station):
+        self.exemplar, self.folder = exemplar, folder
+        self._run("init", folder, "--station", station)
+        self._run("issue", folder, "operator", "--role", "person", "--call", "administer")
+
+    def _run(self, *words):
+        done = subprocess.run([str(word) for word in (self.exemplar, "security", *words)], capture_output=True, text=True, timeout=30)
+        if done.returncode != 0:
+            raise Failure(f"exemplar security {words[0]}: {done.stderr.strip()}")
+
+    def member(self, name):
+        return self.folder / "members" / name
+
+    def options(self, program, bus):
+        """The options of `program`, whose certificate is made when it is first asked for."""
+        member = self.member(program)
+        if not member.exists():
+            self._run("issue", self.folder, program, "--role", self.ROLES.get(program, program))
+        words = ["--security", member] if bus else []
+        if program in self.SERVERS:
+            words += ["--tls-cert", member / "cert.pem", "--tls-key", member / "key.pem", "--tls-client-ca", member / "ca.pem"]
+            words += ["--access", self.folder / "access.yaml"]
+        if program in self.CLIENTS:
+            words += ["--tls-ca", member / "ca.pem"]
+        return words
+
+    def cli_options(self):
+        member = self.member("operator")
+        return ["--tls-ca", member / "ca.pem", "--tls-cert", member / "cert.pem", "--tls-key", member / "key.pem"]
+
+
 class System:
     """All processes of one run, in one station and domain, with their files under `folder`."""
 
-    def __init__(self, binaries, folder, domain, station):
+    def __init__(self, binaries, folder, domain, station, secured=False):
         self.binaries = pathlib.Path(binaries)
         self.folder = pathlib.Path(folder)
         self.logs = self.folder / "logs"
         self.logs.mkdir(parents=True, exist_ok=True)
         self.bus = ["--domain", str(domain), "--station", station]
+        self.secured = Secured(self.binaries / "exemplar", self.folder / "security", station) if secured else None
         self.processes = []
 
     def start(self, program, *arguments, server=False, port=0, bus=True):
+        if self.secured:
+            arguments = (*self.secured.options(program, bus), *arguments)
         if bus:
             arguments = (*self.bus, *arguments)
         process = Process(self.binaries / f"exemplar-{program}", arguments, self.logs / f"{program}.log", server, port)
@@ -93,6 +134,7 @@ class System:
     def cli(self, server, *arguments, timeout_s=300, as_json=True, stderr=None):
         """Runs the command line; returns its JSON output (or text)."""
         command = [str(self.binaries / "exemplar"), "--server", server, "--timeout", str(timeout_s)]
+        command += [str(word) for word in self.secured.cli_options()] if self.secured else []
         command += [*map(str, arguments), *(["--format", "json"] if as_json else [])]
         done = subprocess.run(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=stderr or subprocess.PIPE, text=True, timeout=timeout_s + 30

@@ -62,7 +62,7 @@ TEST_F(StationTest, JointCommandsAreWrittenByTheExecutorsRoleAlone) {
   for (const StationRole& role : StationRoles()) {
     for (const std::string_view topic : role.writes) {
       EXPECT_EQ(
-          topic.find_first_of("*?[") == std::string_view::npos || topic == "ircp/capture-*/status",
+          topic.find_first_of("*?[") == std::string_view::npos || topic == "ircp/capture_*/status",
           true)
           << "a pattern among what " << role.name
           << " writes might reach joint commands: " << topic;
