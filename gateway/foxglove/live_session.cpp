@@ -73,7 +73,7 @@ class LiveSession final : public http::WebSocketSession {
         kept = found->second;
       }
     }
-    if (const Status done = link_->Subscribe(one); !done.ok()) return done;
+    if (Status done = link_->Subscribe(one); !done.ok()) return done;
     if (kept) {
       link_->Deliver(one.channel, kept->time,
                      {reinterpret_cast<const std::byte*>(kept->bytes->data()), kept->bytes->size()},
@@ -147,8 +147,9 @@ class LiveSession final : public http::WebSocketSession {
     } else {
       publication.json.assign(bytes, bytes + data.payload.size());
     }
-    const bool queued = core_.publisher.Run(
-        [&core = core_, link = link_, publication = std::move(publication)](std::stop_token) {
+    const bool queued =
+        core_.publisher.Run([&core = core_, link = link_,
+                             publication = std::move(publication)](const std::stop_token&) {
           Status done = publication.json.empty() ? Status() : CheckJson(publication.json);
           if (done.ok()) done = core.hub.Publish(publication);
           if (done.ok()) {
@@ -183,19 +184,20 @@ class LiveSession final : public http::WebSocketSession {
       return;
     }
     std::string request(reinterpret_cast<const char*>(call.payload.data()), call.payload.size());
-    const bool queued = core_.callers.Run([&core = core_, link = link_, service, id = call.call,
-                                           request = std::move(request)](std::stop_token stop) {
-      Status json = request.empty() ? Status() : CheckJson(request);
-      const Result<std::string> answer =
-          json.ok() ? service->call(request, link->socket().request(), stop)
-                    : Result<std::string>(json.error());
-      if (answer.ok()) {
-        link->SendBytes(ServiceResponseBytes(service->info.id, id, "json", *answer));
-      } else {
-        ++core.failed_calls;
-        link->SendText(ServiceFailureText(service->info.id, id, answer.error().message));
-      }
-    });
+    const bool queued =
+        core_.callers.Run([&core = core_, link = link_, service, id = call.call,
+                           request = std::move(request)](const std::stop_token& stop) {
+          Status json = request.empty() ? Status() : CheckJson(request);
+          const Result<std::string> answer =
+              json.ok() ? service->call(request, link->socket().request(), stop)
+                        : Result<std::string>(json.error());
+          if (answer.ok()) {
+            link->SendBytes(ServiceResponseBytes(service->info.id, id, "json", *answer));
+          } else {
+            ++core.failed_calls;
+            link->SendText(ServiceFailureText(service->info.id, id, answer.error().message));
+          }
+        });
     if (!queued) refuse("too many calls at once");
   }
 

@@ -24,8 +24,8 @@ class Show final : public ircp::RawOutlet {
       : clock_(clock), link_(std::move(link)) {}
 
   /// Opens the file, tells the client what is in it, and plays until `stop`.
-  void Run(const std::filesystem::path& path, std::stop_token stop) {
-    const Status ended = Play(path, std::move(stop));
+  void Run(const std::filesystem::path& path, const std::stop_token& stop) {
+    const Status ended = Play(path, stop);
     if (ended.ok()) return;
     link_->Say(StatusLevel::kError, ended.error().message);
     link_->socket().Close(1011, ended.error().message);
@@ -84,7 +84,7 @@ class Show final : public ircp::RawOutlet {
   }
 
  private:
-  Status Play(const std::filesystem::path& path, std::stop_token stop) {
+  Status Play(const std::filesystem::path& path, const std::stop_token& stop) {
     auto file = recording::FileSource::Open(path);
     if (!file.ok()) return file.error();
     if (const Status read = ReadContents(**file); !read.ok()) return read.error();
