@@ -29,7 +29,7 @@ DISK_MB = 160
 PLACES = ["0.46,-0.12", "0.40,-0.28", "0.52,-0.22", "0.36,-0.18"]
 NEW_PLACE = "0.45,-0.20"
 SERVERS = {"learning": "127.0.0.1:50051", "recorder": "127.0.0.1:50052", "executor": "127.0.0.1:50053"}
-LONG_RUNNING = ["recorder", "learning", "executor", "simulator", "capture-vision", "capture-tactile"]
+LONG_RUNNING = ["recorder", "learning", "executor", "simulator", "capture-vision", "capture-tactile", "gateway"]
 LIMIT_S = 150  # for anything to work again; what it took is printed
 STARTS = 5  # of a motion that a busy machine stops
 LOSSY = {"ircp/camera"}  # best effort by design
@@ -81,8 +81,8 @@ class ComposeTest(unittest.TestCase):
         tell(f"up and healthy: {time.monotonic() - begin:.0f} s")
         cls.station.compose("run", "--rm", "capture-suit", "--places", ";".join(PLACES), "--record", "--name", "trial", timeout=240)
         files = [f"/trials/trial-{number:03}.mcap" for number in range(1, len(PLACES) + 1)]
-        # With the image of the command line, as on a machine that has nothing else.
-        submitted = json.loads(cls.station.compose("run", "--rm", "exemplar", "--server", "learning:50051", "trial", "submit", "--skill", "press", *files, "--format", "json"))
+        # With the image of the command line and by the gateway, as on a machine that has nothing else.
+        submitted = json.loads(cls.station.compose("run", "--rm", "exemplar", "trial", "submit", "--skill", "press", *files, "--format", "json"))
         assert len(submitted) == len(PLACES), submitted
         cls.cli("learning", "skill", "learn", "press")
         cls.station.compose("up", "-d", *LONG_RUNNING)  # the simulator now follows commands
@@ -192,7 +192,7 @@ class ComposeTest(unittest.TestCase):
     # ---- what happens to it ----
 
     def test_each_service_killed_comes_back_by_itself(self):
-        for service in ("learning", "capture-vision", "capture-tactile", "recorder", "simulator"):
+        for service in ("learning", "capture-vision", "capture-tactile", "recorder", "simulator", "gateway"):
             with self.subTest(service):
                 self.station.signal(service, "KILL")
                 self.works_again(f"{service} killed", time.monotonic())
@@ -359,6 +359,22 @@ class ComposeTest(unittest.TestCase):
             self.station.compose("up", "-d", *LONG_RUNNING)
             self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
         self.works_again("with multicast again", time.monotonic())
+
+    def test_prometheus_hears_every_program(self):
+        query = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:9090/api/v1/query?query=up').read().decode())"
+        try:
+            self.station.compose("--profile", "observe", "up", "-d", "prometheus")
+
+            def up():
+                try:
+                    found = json.loads(self.station.within("prometheus", sys.executable, "-c", query))["data"]["result"]
+                except AssertionError:
+                    return False
+                return {one["metric"]["program"] for one in found if one["value"][1] == "1"} == set(LONG_RUNNING)
+
+            wait_for(up, "Prometheus to hear all", LIMIT_S)
+        finally:
+            self.station.compose("--profile", "observe", "rm", "--stop", "--force", "prometheus")
 
     def test_containers_are_nobody_and_write_nowhere_else(self):
         for service in LONG_RUNNING:

@@ -48,7 +48,9 @@ class Engine:
             command = [*isolated, *command]
         for stale in ("pid", "docker.sock"):
             (self.folder / stale).unlink(missing_ok=True)
-        shutil.rmtree(self.folder / "exec", ignore_errors=True)
+        # Containers of a run that was cut off would start again with the engine, on whatever network it has.
+        for stale in ("exec", "data/containers", "data/network"):
+            shutil.rmtree(self.folder / stale, ignore_errors=True)
         with open(self.folder / "dockerd.log", "w", encoding="utf-8") as log:
             self.process = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log, env=self.environment)
         deadline = time.monotonic() + 60
@@ -64,6 +66,9 @@ class Engine:
 
     def __exit__(self, *_):
         if self.process.poll() is None:
+            listed = subprocess.run(["docker", "ps", "-aq"], env=self.environment, capture_output=True, text=True, check=False).stdout.split()
+            if listed:
+                subprocess.run(["docker", "rm", "-f", "-v", *listed], env=self.environment, capture_output=True, check=False)
             # unshare hands no signal on: its child does the work.
             target = self.first() if self.alone else self.process.pid
             if target:
