@@ -36,7 +36,14 @@ Result<std::unique_ptr<HttpSide>> HttpSide::Create(const ProgramOptions& words,
   side->port_file_ = words.http_port_file;
   side->grpc_ = &grpc;
   side->calls_ = grpc.MakeJsonCalls();
-  auto server = http::Server::Create(words.HttpOptions(common), log);
+  http::ServerOptions options = words.HttpOptions(common);
+  if (!common.server.access.empty()) {
+    auto door = Door::Open(common.server.access, side->clock_, log);
+    if (!door) return door.error();
+    side->door_ = std::move(*door);
+    options.gate = [&door = *side->door_](http::Request& request) { return door.Judge(request); };
+  }
+  auto server = http::Server::Create(options, log);
   if (!server) return WithPlace(server.error(), "--http");
   side->server_ = std::move(*server);
   return side;
@@ -55,6 +62,9 @@ Status HttpSide::Start(std::vector<Metric> metrics) {
   api.metrics = [metrics = std::move(metrics)] { return program::MetricsText(metrics); };
   api.make_request_id = RequestIds();
   if (Status added = AddRoutes(*server_, api); !added) return added;
+  if (door_ != nullptr) {
+    if (Status added = door_->AddRoutes(*server_); !added) return added;
+  }
   server_->Start();
   if (port_file_.empty()) return {};
   return rpc::WritePortFile(port_file_, server_->port());

@@ -3,10 +3,12 @@
 #include <vector>
 
 #include "exemplar/api/json_calls.hpp"
+#include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/base/metric.hpp"
 #include "exemplar/http/server.hpp"
 #include "exemplar/rpc/server.hpp"
+#include "gateway/door.hpp"
 #include "gateway/program_options.hpp"
 
 namespace exemplar::gateway {
@@ -26,9 +28,11 @@ class HttpSide {
   void Stop() { server_->Stop(); }
 
  private:
+  const SystemClock clock_;
   std::string port_file_;
   rpc::Server* grpc_ = nullptr;
   std::unique_ptr<api::JsonCalls> calls_;
+  std::unique_ptr<Door> door_;  ///< where an access file says who may call
   std::unique_ptr<http::Server> server_;
 };
 
