@@ -20,7 +20,7 @@ class Side final : public Ros2Side {
       robot_ = std::move(*robot);
     }
     auto graph = bus::Participant::Create({.domain = common.domain,
-                                           .station = {},
+                                           .without_station = true,
                                            .name = "exemplar-gateway-ros2",
                                            .interfaces = common.interfaces,
                                            .peers = common.peers,

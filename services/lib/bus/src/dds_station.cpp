@@ -193,7 +193,7 @@ Result<std::unique_ptr<DdsStation>> DdsStation::Create(const ParticipantOptions&
   if (!participant.ok()) return participant.error();
   dds::PublisherQos publisher_qos;
   dds::SubscriberQos subscriber_qos;
-  if (!options.station.empty()) {
+  if (!options.without_station) {
     publisher_qos.partition().push_back(options.station.c_str());
     subscriber_qos.partition().push_back(options.station.c_str());
   }

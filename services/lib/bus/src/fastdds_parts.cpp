@@ -96,8 +96,9 @@ Status CheckOptions(const ParticipantOptions& options) {
                            "domain");
   }
   // A partition with wildcards would match every station.
-  if (options.station.empty() || options.station.size() > kMaxNameBytes ||
-      options.station.find_first_of("*?[]") != std::string::npos) {
+  if (!options.without_station &&
+      (options.station.empty() || options.station.size() > kMaxNameBytes ||
+       options.station.find_first_of("*?[]") != std::string::npos)) {
     return InvalidArgument(
         "station \"" + options.station + "\" must be 1 to 200 characters without any of * ? [ ]",
         "station");

@@ -248,7 +248,9 @@ Result<std::unique_ptr<RawTap>> MakeRawTap(const ParticipantOptions& options,
                                            RawTapOptions tap_options) {
   ParticipantOptions own = options;
   own.name += "-tap";
-  auto tap = std::make_unique<Tap>(std::move(tap_options), own.station, *own.clock, *own.log);
+  auto tap = std::make_unique<Tap>(std::move(tap_options),
+                                   own.without_station ? std::string() : own.station, *own.clock,
+                                   *own.log);
   if (Status started = tap->Start(own); !started.ok()) return started.error();
   return std::unique_ptr<RawTap>(std::move(tap));
 }

@@ -19,7 +19,9 @@ inline constexpr std::size_t kPictureSharedMemoryBytes = std::size_t{16} << 20;
 
 struct ParticipantOptions {
   int domain = 0;                   ///< 0 to 232
-  std::string station = "default";  ///< the partition of all its topics; empty: none, as others do
+  std::string station = "default";  ///< the partition of all its topics
+  /// Instead of a station: its topics lie in no partition, where other middlewares' do by default.
+  bool without_station = false;
   std::string name = "exemplar";    ///< as discovery tools show it
   /// Addresses or names ("127.0.0.1", "eth1") of the interfaces to use; empty: all.
   std::vector<std::string> interfaces = {};
