@@ -17,10 +17,13 @@ constexpr int kControlPriority = 40;
 constexpr Duration kShutdownPatience = std::chrono::seconds(5);
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
+}  // namespace
+
 Error Refused(State state, Event event, const std::string& holder) {
   std::string message =
       "cannot " + std::string(ToString(event)) + " while " + std::string(ToString(state));
-  if (!holder.empty() && (IsMoving(state) || state == State::kPlanning)) {
+  if (!holder.empty() &&
+      (IsMoving(state) || state == State::kPlanning || state == State::kTeleoperating)) {
     message += ": the robot belongs to " + holder;
   }
   if (state == State::kProtectiveStop || state == State::kEmergencyStop) {
@@ -29,17 +32,17 @@ Error Refused(State state, Event event, const std::string& holder) {
   return FailedPrecondition(std::move(message));
 }
 
-}  // namespace
-
 Executor::Executor(const Clock& clock, Log& log, api::SkillApi& skills,
                    const kinematics::RobotDescription& robot, const scene::Description& scene,
                    ExecutorOptions options)
     : clock_(clock),
       log_(log),
       robot_(robot),
+      scene_(scene),
       options_(std::move(options)),
       view_(robot.chain.joint_names()),
       planner_(clock, skills, robot, scene, view_, options_.planner),
+      following_planner_(clock, planner_, tracks_, robot, options_.following),
       state_received_ns_(kNever),
       safety_received_ns_(kNever) {}
 
@@ -77,6 +80,10 @@ Status Executor::Connect(ircp::Bus& bus) {
   const Duration validity = std::max<Duration>(5 * period, std::chrono::milliseconds(100));
   commands_ = std::make_unique<CommandStream>(*std::move(writer), robot_.chain.joint_names(),
                                               validity, options_.realtime);
+  auto plans = bus.MakeWriter<ircp::PlanSample>(kProgram);
+  if (!plans.ok()) return plans.error();
+  plans_ = *std::move(plans);
+  if (const Status on = ConnectTeleoperation(bus); !on.ok()) return on;
   auto control = ircp::ControlServer::Create(
       bus, clock_, kProgram,
       [this](const ircp::CommandSample& command) { return OnCommand(command); });
@@ -111,9 +118,7 @@ Status Executor::Connect(ircp::Bus& bus) {
   if (!states.ok()) return states.error();
   state_reader_ = *std::move(states);
   auto objects = bus.MakeReader<ircp::ObjectSample>(
-      [this](const ircp::ObjectSample& sample, const ircp::Reception&) {
-        view_.Take(sample, clock_.Steady());
-      });
+      [this](const ircp::ObjectSample& sample, const ircp::Reception&) { OnObject(sample); });
   if (!objects.ok()) return objects.error();
   object_reader_ = *std::move(objects);
   auto safety = bus.MakeReader<ircp::SafetySample>(
@@ -127,6 +132,7 @@ Executor::~Executor() {
   state_reader_.reset();
   object_reader_.reset();
   safety_reader_.reset();
+  teleoperation_.reset();
   for (std::jthread* thread : {&control_thread_, &watch_thread_, &publish_thread_}) {
     thread->request_stop();
     if (thread->joinable()) thread->join();
@@ -153,17 +159,18 @@ Status Executor::Apply(Event event, std::string detail, std::shared_ptr<MotionRu
       run_ = std::move(run);
       run_over_ = false;
       beats_ = 0;
+      const std::lock_guard measuring(measuring_mutex_);
+      measuring_ = run_;
     }
-    if (IsMoving(before) && !IsMoving(after)) {
+    if (after == State::kTeleoperating) holder_ = "an operator: it is teleoperated";
+    const bool left = before == State::kTeleoperating && after != State::kTeleoperating;
+    if (left || (IsMoving(before) && !IsMoving(after))) {
       run_end_ = after;
       run_detail_ = detail;
     }
-    transitions_.emplace_back(after, detail);
+    transitions_.push_back({after, std::move(detail), std::pair(before, event)});
   }
   changed_.notify_all();
-  const bool bad = after == State::kProtectiveStop || after == State::kEmergencyStop;
-  log_.Write(bad ? LogLevel::kWarning : LogLevel::kInfo, ToString(after),
-             {{"was", ToString(before)}, {"event", ToString(event)}, {"detail", detail}});
   return {};
 }
 
@@ -195,6 +202,8 @@ ircp::Answer Executor::OnCommand(const ircp::CommandSample& command) {
     done = Stop();
   } else if (command.action == "reset") {
     done = Reset();
+  } else if (command.action == "end_teleoperation") {
+    done = EndTeleoperation();
   } else if (command.action == "speed") {
     const auto factor = command.arguments.find("factor");
     const std::optional<double> value =
@@ -202,8 +211,9 @@ ircp::Answer Executor::OnCommand(const ircp::CommandSample& command) {
     done =
         value ? SetSpeed(*value) : InvalidArgument("speed needs a number as \"factor\"", "factor");
   } else {
-    done = InvalidArgument("unknown action \"" + command.action +
-                           "\"; known are pause, resume, cancel, stop, reset, speed");
+    done = InvalidArgument(
+        "unknown action \"" + command.action +
+        "\"; known are pause, resume, cancel, stop, reset, speed, end_teleoperation");
   }
   if (!done.ok()) return {false, done.error().message, {}};
   return {true, std::string(ToString(state_.load())), {}};
@@ -211,6 +221,7 @@ ircp::Answer Executor::OnCommand(const ircp::CommandSample& command) {
 
 void Executor::OnSafety(const ircp::SafetySample& sample) {
   safety_received_ns_.store(clock_.Steady().count());
+  teleoperation_->Take(sample);
   if (sample.emergency_stop) {
     (void)Apply(Event::kEmergency, "emergency stop by " + sample.header.source);
   } else if (sample.reset && state_.load() == State::kEmergencyStop) {
@@ -221,15 +232,47 @@ void Executor::OnSafety(const ircp::SafetySample& sample) {
 void Executor::OnJointState(const ircp::JointStateSample& sample) {
   const Duration now = clock_.Steady();
   const std::optional<MeasuredState> state = view_.Take(sample, now);
-  if (!state) return;
-  state_received_ns_.store(now.count());
-  std::shared_ptr<MotionRun> run;
+  if (state) {
+    state_received_ns_.store(now.count());
+    {
+      const std::lock_guard lock(measuring_mutex_);
+      if (measuring_) measuring_->Measure(*state, commands_->sent());
+    }
+    measured_.notify_one();
+    teleoperation_->Measure(*state);
+  }
+  state_seq_.store(sample.header.seq);
+  if (options_.on_taken) options_.on_taken();
+}
+
+void Executor::OnObject(const ircp::ObjectSample& sample) {
+  constexpr Duration kOldest = std::chrono::milliseconds(300);
+  const Duration now = clock_.Steady();
+  view_.Take(sample, now);
+  // A sender whose clock is another's is taken to be prompt.
+  const Duration age = clock_.Now() - sample.header.stamp;
+  const bool plausible = age >= Duration::zero() && age <= kOldest;
+  const auto& variance = sample.position_variance_m2;
+  const double sigma_m = std::sqrt(*std::max_element(variance.begin(), variance.end()));
+  tracks_.Add(sample.name, plausible ? now - age : now, sample.base_T_object, sigma_m);
+  std::shared_ptr<Following> following;
   {
     const std::lock_guard lock(mutex_);
-    if (!run_over_) run = run_;
-    if (run) run->Measure(*state, commands_->sent());
+    following = following_;
   }
-  if (run) changed_.notify_all();
+  if (following) following->Take(sample.name);
+  if (sample.header.source == ircp::kTrackerSource) tracker_seq_.store(sample.header.seq);
+  if (options_.on_taken) options_.on_taken();
+}
+
+bool Executor::HasTaken(const ircp::SentInputs& sent) const {
+  const std::uint64_t states = state_seq_.load();
+  const std::uint64_t objects = tracker_seq_.load();
+  if (states == 0 && state_reader_->matched_writers() == 0) return false;
+  if (states > 0 && states < sent.joint_states) return false;
+  if (objects > 0 && objects < sent.objects) return false;
+  const std::lock_guard lock(measuring_mutex_);
+  return !measuring_ || !measuring_->has_unwatched();
 }
 
 std::optional<Duration> Executor::StateAge() const {
@@ -267,6 +310,7 @@ ExecutorFigures Executor::figures() const {
   now.lateness_s = ToSeconds(Duration(lateness_ns_.load(std::memory_order_relaxed)));
   now.lateness_max_s = ToSeconds(Duration(lateness_max_ns_.load(std::memory_order_relaxed)));
   if (const std::optional<Duration> age = StateAge()) now.state_age_s = ToSeconds(*age);
+  now.teleoperation = teleoperation_->figures();
   const std::lock_guard lock(mutex_);
   now.executions = executions_;
   return now;
@@ -284,7 +328,8 @@ std::uint64_t Executor::CommandsSent() const {
 std::vector<ircp::TopicReader> Executor::readers() const {
   return {{ircp::JointStateSample::kTopic, state_reader_.get()},
           {ircp::ObjectSample::kTopic, object_reader_.get()},
-          {ircp::SafetySample::kTopic, safety_reader_.get()}};
+          {ircp::SafetySample::kTopic, safety_reader_.get()},
+          {ircp::SuitSample::kTopic, teleoperation_->suit_reader()}};
 }
 
 Result<api::RobotStatus> Executor::GetStatus() {
@@ -312,6 +357,10 @@ Result<api::RobotStatus> Executor::GetStatus() {
 
 Status Executor::Begin(const api::ExecuteRequest& request) {
   if (request.skill.empty()) return InvalidArgument("no skill is named", "skill");
+  if (request.follow && !request.objects.empty()) {
+    return InvalidArgument("a target that is followed is taken where it is seen: name no objects",
+                           "objects");
+  }
   if (!(request.speed > 0 && request.speed <= 1)) {
     return InvalidArgument(
         "speed is " + FormatDouble(request.speed) + ", must be above 0 and at most 1", "speed");
@@ -319,17 +368,30 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
   {
     const std::lock_guard lock(mutex_);
     if (closing_) return Unavailable("the executor is shutting down");
-    if (!run_over_) return Refused(state_.load(), Event::kPlan, holder_);
+    if (teleoperation_->active()) return Refused(state_.load(), Event::kPlan, holder_);
   }
+  if (const Status rests = AwaitRest(); !rests.ok()) return rests;
   if (const std::optional<std::string> silence = SafetySilence()) return Unavailable(*silence);
   Status begun = Apply(Event::kPlan, "planning \"" + request.skill + "\"");
   if (!begun.ok()) return begun;
   const std::lock_guard lock(mutex_);
   holder_ = "an execution of \"" + request.skill + "\"";
+  if (!request.client.empty()) holder_ += " (" + request.client + ")";
   return {};
 }
 
-Result<Planned> Executor::MakePlan(const api::ExecuteRequest& request) {
+Status Executor::AwaitRest() {
+  std::unique_lock lock(mutex_);
+  const auto waits = [this] { return !run_over_ && Next(state_.load(), Event::kPlan).has_value(); };
+  changed_.wait_for(lock, options_.rest_patience, [&] { return !waits(); });
+  if (run_over_) return {};
+  if (!waits()) return Refused(state_.load(), Event::kPlan, holder_);
+  return Unavailable("the robot is still slowing down after " + holder_ + ", which is " +
+                     std::string(ToString(state_.load())) + "; ask again");
+}
+
+Result<Planned> Executor::MakePlan(const api::ExecuteRequest& request,
+                                   std::optional<FollowingPlan>* followed) {
   std::stop_token stop;
   std::optional<Eigen::VectorXd> last_command;
   {
@@ -338,7 +400,18 @@ Result<Planned> Executor::MakePlan(const api::ExecuteRequest& request) {
     stop = planning_stop_.get_token();
     last_command = last_command_;
   }
-  Result<Planned> planned = planner_.Plan(request, last_command, stop);
+  Result<Planned> planned = FailedPrecondition("not planned");
+  if (request.follow) {
+    Result<FollowingPlan> plan = following_planner_.Plan(request, last_command, stop);
+    if (plan.ok()) {
+      planned = std::move(plan->planned);
+      if (followed != nullptr) followed->emplace(*std::move(plan));
+    } else {
+      planned = plan.error();
+    }
+  } else {
+    planned = planner_.Plan(request, last_command, stop);
+  }
   if (!planned.ok()) {
     plans_refused_.fetch_add(1, std::memory_order_relaxed);
     (void)Apply(Event::kRefused, "refused: " + planned.error().message);
@@ -349,7 +422,23 @@ Result<Planned> Executor::MakePlan(const api::ExecuteRequest& request) {
     return Error{ErrorCode::kCancelled,
                  "planning was ended: the robot is in " + std::string(ToString(state_.load()))};
   }
+  ShowPlan(request.skill, planned->motion.trajectory);
   return planned;
+}
+
+void Executor::ShowPlan(const std::string& skill, const motion::JointTrajectory& trajectory) {
+  ircp::PlanSample sample;
+  sample.skill = skill;
+  sample.names = trajectory.joint_names;
+  sample.times_s = trajectory.time_s;
+  for (Eigen::Index frame = 0; frame < trajectory.positions.rows(); ++frame) {
+    const Eigen::VectorXd joints = trajectory.positions.row(frame).transpose();
+    const Eigen::Vector3d tool = robot_.chain.ToolPose(joints).translation;
+    sample.positions.insert(sample.positions.end(), joints.begin(), joints.end());
+    sample.tool_m.insert(sample.tool_m.end(), tool.begin(), tool.end());
+  }
+  const Status shown = plans_->Write(std::move(sample));
+  if (!shown.ok()) log_.Error("plan not shown", {{"reason", shown.error().message}});
 }
 
 Result<api::PlanSummary> Executor::Plan(const api::ExecuteRequest& request) {
@@ -369,7 +458,8 @@ Result<api::ExecutionResult> Executor::Execute(
   if (!begun.ok()) return begun.error();
   const std::stop_callback on_stop(stop, [this] { (void)Cancel(); });
   if (feedback) feedback({std::string(ToString(State::kPlanning)), 0, 0, 0, 0});
-  Result<Planned> planned = MakePlan(request);
+  std::optional<FollowingPlan> followed;
+  Result<Planned> planned = MakePlan(request, &followed);
   if (!planned.ok()) return planned.error();
 
   api::ExecutionResult result;
@@ -381,16 +471,38 @@ Result<api::ExecutionResult> Executor::Execute(
     return there.error();
   }
   const std::uint64_t sent_before = commands_->sent();
+  std::shared_ptr<Following> following;
+  if (followed) {
+    following = std::make_shared<Following>(clock_, log_, following_planner_, robot_, request,
+                                            *followed, planned->motion);
+    {
+      const std::lock_guard lock(mutex_);
+      following_ = following;
+    }
+    following->Start();
+    if (!clock_.SleepUntil(followed->start, stop)) {
+      const std::lock_guard lock(mutex_);
+      following_.reset();
+      return Error{ErrorCode::kCancelled, "cancelled before the motion began"};
+    }
+  }
+  WatchLimits watch = options_.watch;
+  if (following) watch.slow_within_m = 0;  // who slows down comes too late for a moving target
   const auto run =
       std::make_shared<MotionRun>(robot_, std::move(planned->motion), std::move(planned->checker),
-                                  options_.watch, std::move(planned->zones));
+                                  watch, std::move(planned->zones));
   {
     const std::lock_guard lock(mutex_);
     fixed_ = planned->objects;
     placed_ = std::move(planned->placed);
   }
+  run->SetFollower(following.get());
   const Status started = Apply(Event::kStart, "executing \"" + request.skill + "\"", run);
-  if (!started.ok()) return started.error();
+  if (!started.ok()) {
+    const std::lock_guard lock(mutex_);
+    following_.reset();
+    return started.error();
+  }
 
   std::unique_lock lock(mutex_);
   for (std::uint64_t told = 0;;) {
@@ -412,6 +524,14 @@ Result<api::ExecutionResult> Executor::Execute(
 
   commands_->Flush();
   run->Report(result);
+  if (following) {
+    {
+      const std::lock_guard held(mutex_);
+      following_.reset();
+    }
+    following->Report(result);
+    log_.Info("followed", {{"target", followed->target}, {"plans", following->plans_blended()}});
+  }
   result.commands_sent = commands_->sent() - sent_before;
   log_.Info("executed", {{"skill", request.skill},
                          {"state", result.state},
@@ -426,6 +546,8 @@ void Executor::ControlLoop(const std::stop_token& stop) {
   if (options_.realtime && !RaisePriority(kControlPriority)) {
     log_.Warning("no real-time priority", {{"advice", "CAP_SYS_NICE, or an rtprio limit"}});
   }
+  std::stop_source left;
+  left.request_stop();
   while (true) {
     std::shared_ptr<MotionRun> run;
     {
@@ -442,6 +564,8 @@ void Executor::ControlLoop(const std::stop_token& stop) {
       last_command_ = run->commanded();
     }
     changed_.notify_all();
+    // Where time waits for those who sleep by it: this one does no more.
+    (void)clock_.SleepUntil(Duration::max(), left.get_token());
   }
 }
 
@@ -476,7 +600,8 @@ bool Executor::RunMotion(MotionRun& run, const std::stop_token& stop) {
     commands_->Put(run.Tick(elapsed_s, state_.load(), speed_.load(std::memory_order_relaxed)));
 
     if (IsMoving(state_.load())) {
-      const std::optional<std::string> silence = Silence();
+      std::optional<std::string> silence = Silence();
+      if (!silence && run.follower() != nullptr) silence = run.follower()->Problem();
       if (silence) (void)Apply(Event::kFault, *silence);
     }
     since_beat_s += elapsed_s;
@@ -501,38 +626,55 @@ void Executor::CountCycle(Duration lateness) {
 }
 
 void Executor::WatchLoop(const std::stop_token& stop) {
+  std::shared_ptr<MotionRun> run;  // beside the loop that runs it and the call that asked for it
+  std::vector<geometry::NamedPose> fixed;
+  std::vector<geometry::NamedPose> placed;
   while (true) {
-    std::shared_ptr<MotionRun> run;
-    std::optional<collision::Scene> moved;
+    std::shared_ptr<MotionRun> next;
     {
-      std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop, [this] { return run_ != nullptr && run_->has_unwatched(); })) {
+      std::unique_lock lock(measuring_mutex_);
+      if (!measured_.wait(lock, stop,
+                          [this] { return measuring_ && measuring_->has_unwatched(); })) {
         return;
       }
-      run = run_;
-      moved = planner_.MovedScene(fixed_, placed_);
+      next = measuring_;
     }
+    if (next != run) {
+      run = std::move(next);
+      const std::lock_guard lock(mutex_);
+      fixed = fixed_;
+      placed = placed_;
+    }
+    std::optional<collision::Scene> moved = planner_.MovedScene(fixed, placed);
     if (moved) {
       const Status set = run->SetScene(*std::move(moved));
       if (!set.ok()) log_.Warning("an object's place is not used", {{"why", set.error().message}});
     }
     const std::optional<std::string> wrong = run->Watch();
     if (wrong && IsMoving(state_.load())) (void)Apply(Event::kFault, *wrong);
-    WakeAll();
+    if (run->finished()) WakeAll();
+    if (options_.on_taken) options_.on_taken();
   }
 }
 
 void Executor::PublishLoop(const std::stop_token& stop) {
   while (true) {
-    std::pair<State, std::string> transition;
+    Transition now;
     {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, stop, [this] { return !transitions_.empty(); });
       if (transitions_.empty()) return;
-      transition = std::move(transitions_.front());
+      now = std::move(transitions_.front());
       transitions_.pop_front();
     }
-    control_->SetState(std::string(ToString(transition.first)), transition.second);
+    if (now.from) {
+      const bool bad = now.state == State::kProtectiveStop || now.state == State::kEmergencyStop;
+      log_.Write(bad ? LogLevel::kWarning : LogLevel::kInfo, ToString(now.state),
+                 {{"was", ToString(now.from->first)},
+                  {"event", ToString(now.from->second)},
+                  {"detail", now.detail}});
+    }
+    control_->SetState(std::string(ToString(now.state)), now.detail);
   }
 }
 
@@ -546,11 +688,13 @@ void Executor::Shutdown() {
     const std::lock_guard lock(mutex_);
     closing_ = true;
   }
-  if (IsMoving(state_.load()) || state_.load() == State::kPlanning) {
+  const State state = state_.load();
+  if (IsMoving(state) || state == State::kPlanning || state == State::kTeleoperating) {
     (void)Apply(Event::kStop, "the executor is shutting down");
   }
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, kShutdownPatience, [this] { return run_over_; });
+  changed_.wait_for(lock, kShutdownPatience,
+                    [this] { return run_over_ && !teleoperation_->active(); });
 }
 
 }  // namespace exemplar::executor

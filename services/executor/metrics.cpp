@@ -7,9 +7,7 @@ namespace exemplar::executor {
 std::vector<Metric> MetricsOf(const Executor& executor) {
   const std::string prefix = "exemplar_executor";
   std::vector<std::string> states;
-  for (int state = 0; state <= static_cast<int>(State::kAborted); ++state) {
-    states.emplace_back(ToString(static_cast<State>(state)));
-  }
+  for (const State state : kAllStates) states.emplace_back(ToString(state));
   std::vector<Metric> metrics = ircp::ReceivedMetrics(prefix, executor.readers());
   metrics.push_back(ircp::SentMetric(prefix, [&executor] { return executor.sent(); }));
   metrics.push_back(
@@ -45,6 +43,18 @@ std::vector<Metric> MetricsOf(const Executor& executor) {
                        if (now.state_age_s) values.push_back({{}, *now.state_age_s});
                        return values;
                      }});
+  metrics.push_back(
+      CounterOf(prefix + "_suit_samples_total",
+                "Samples on ircp/suit that a teleoperated robot was asked to follow",
+                [&executor] { return executor.figures().teleoperation.suit_samples; }));
+  metrics.push_back(
+      CounterOf(prefix + "_suit_samples_left_out_total",
+                "Samples on ircp/suit that came late, or from another suit than the one followed",
+                [&executor] { return executor.figures().teleoperation.suit_left_out; }));
+  metrics.push_back(
+      GaugeOf(prefix + "_suit_to_command_p99_seconds",
+              "From a suit sample's reception to its command, 99 of 100",
+              [&executor] { return executor.figures().teleoperation.latency_p99_s; }));
   return metrics;
 }
 

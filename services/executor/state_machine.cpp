@@ -22,6 +22,8 @@ std::string_view ToString(State state) {
       return "done";
     case State::kAborted:
       return "aborted";
+    case State::kTeleoperating:
+      return "teleoperating";
   }
   return "unknown";
 }
@@ -54,6 +56,10 @@ std::string_view ToString(Event event) {
       return "finish";
     case Event::kMiss:
       return "miss";
+    case Event::kTeleoperate:
+      return "teleoperate";
+    case Event::kLeave:
+      return "end teleoperation";
   }
   return "unknown";
 }
@@ -69,6 +75,7 @@ std::optional<State> Next(State state, Event event) {
     case State::kDone:
     case State::kAborted:
       if (event == Event::kPlan) return State::kPlanning;
+      if (event == Event::kTeleoperate) return State::kTeleoperating;
       if (event == Event::kReset) return State::kIdle;
       if (event == Event::kStart && state == State::kReady) return State::kExecuting;
       if (event == Event::kCancel && state == State::kReady) return State::kIdle;
@@ -86,6 +93,11 @@ std::optional<State> Next(State state, Event event) {
       if (event == Event::kFault) return State::kProtectiveStop;
       if (event == Event::kFinish) return State::kDone;
       if (event == Event::kMiss) return State::kAborted;
+      return std::nullopt;
+    case State::kTeleoperating:
+      if (event == Event::kLeave) return State::kDone;
+      if (event == Event::kCancel) return State::kAborted;
+      if (event == Event::kFault) return State::kProtectiveStop;
       return std::nullopt;
     case State::kProtectiveStop:
     case State::kEmergencyStop:

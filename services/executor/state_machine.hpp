@@ -17,6 +17,7 @@ enum class State {
   kEmergencyStop,   ///< latched until a reset
   kDone,
   kAborted,
+  kTeleoperating,  ///< follows an operator, or holds; see teleoperation_phase.hpp
 };
 
 enum class Event {
@@ -31,17 +32,20 @@ enum class Event {
   kFault,   ///< something watched went wrong; needs a reset
   kEmergency,
   kReset,
-  kFinish,  ///< the end of the motion is reached
-  kMiss,    ///< it is reached, but a press met no touch
+  kFinish,       ///< the end of the motion is reached
+  kMiss,         ///< it is reached, but a press met no touch
+  kTeleoperate,  ///< the robot belongs to an operator from here on
+  kLeave,        ///< teleoperation ends as it should
 };
 
 inline constexpr std::array kAllStates = {
-    State::kIdle,           State::kPlanning,      State::kReady, State::kExecuting, State::kPaused,
-    State::kProtectiveStop, State::kEmergencyStop, State::kDone,  State::kAborted};
+    State::kIdle,    State::kPlanning,       State::kReady,         State::kExecuting,
+    State::kPaused,  State::kProtectiveStop, State::kEmergencyStop, State::kDone,
+    State::kAborted, State::kTeleoperating};
 inline constexpr std::array kAllEvents = {
-    Event::kPlan,   Event::kPlanned, Event::kRefused, Event::kStart, Event::kPause,
-    Event::kResume, Event::kCancel,  Event::kStop,    Event::kFault, Event::kEmergency,
-    Event::kReset,  Event::kFinish,  Event::kMiss};
+    Event::kPlan,   Event::kPlanned, Event::kRefused, Event::kStart,       Event::kPause,
+    Event::kResume, Event::kCancel,  Event::kStop,    Event::kFault,       Event::kEmergency,
+    Event::kReset,  Event::kFinish,  Event::kMiss,    Event::kTeleoperate, Event::kLeave};
 
 /// "executing", "protective_stop", ...
 std::string_view ToString(State state);

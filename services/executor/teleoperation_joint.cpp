@@ -8,8 +8,9 @@ namespace {
 
 constexpr double kStep_s = 1e-3;
 constexpr double kShareOfLimits = 0.95;
-/// Of what the limits allow: what is left over makes up for the limit above it.
+/// Of what the limits allow: what is left over makes up for what follows late.
 constexpr double kBrakingShare = 0.6;
+constexpr double kBrakingJerkShare = 0.3;
 
 JointMotion After(const JointMotion& from, double jerk, double t) {
   return {from.position + t * (from.velocity + t * (from.acceleration / 2 + t * jerk / 6)),
@@ -23,6 +24,15 @@ double RateFor(double error, double gain, double deceleration) {
   const double size = std::abs(error);
   if (size <= small) return gain * error;
   return std::copysign(std::sqrt(2 * deceleration * (size - small / 2)), error);
+}
+
+/// The velocity from which one comes to rest within `way`.
+double SpeedFor(double way, double deceleration, double jerk) {
+  // Slower than this the deceleration is not reached.
+  const double edge = deceleration * deceleration / jerk;
+  if (way * way * jerk <= edge * edge * edge) return std::cbrt(way * way * jerk);
+  const double half = edge / 2;
+  return std::sqrt(half * half + 2 * deceleration * way) - half;
 }
 
 }  // namespace
@@ -42,9 +52,11 @@ JointMotion Follow(const JointMotion& from, double target, double target_velocit
   JointMotion now = from;
   for (int step = 0; step < steps; ++step) {
     const double error = target - now.position;
-    const double velocity = std::clamp(
-        target_velocity + RateFor(error, kPositionGain, kBrakingShare * limits.acceleration),
-        -limits.velocity, limits.velocity);
+    const double closing = std::min(kPositionGain * std::abs(error),
+                                    SpeedFor(std::abs(error), kBrakingShare * limits.acceleration,
+                                             kBrakingJerkShare * limits.jerk));
+    const double velocity = std::clamp(target_velocity + std::copysign(closing, error),
+                                       -limits.velocity, limits.velocity);
     const double acceleration =
         std::clamp(RateFor(velocity - now.velocity, kVelocityGain, kBrakingShare * limits.jerk),
                    -limits.acceleration, limits.acceleration);

@@ -95,6 +95,7 @@ void TeleoperationMotion::Begin(const Eigen::Ref<const Eigen::VectorXd>& start,
   presses_ = presses;
   armed_at_.reset();
   heard_ = false;
+  latest_ = {};
   fault_ = SuitFault::kNone;
   driven_.reset();
   nearest_m_ = kNever;
@@ -164,8 +165,10 @@ std::optional<PhaseChange> TeleoperationMotion::WhyNoPosture(Duration now) const
   const auto because = [](HoldReason reason, int joint = 0, double value = 0) {
     return PhaseChange{Phase::kHolding, reason, joint, value, 0};
   };
-  if (fault_ == SuitFault::kUnknown) return because(HoldReason::kSuitUnknown);
-  if (fault_ == SuitFault::kNotFinite) return because(HoldReason::kSuitNotFinite, fault_joint_);
+  const bool unusable = !heard_ && now - latest_.received <= options_.suit_patience;
+  const SuitFault fault = fault_ == SuitFault::kNone && unusable ? latest_.fault : fault_;
+  if (fault == SuitFault::kUnknown) return because(HoldReason::kSuitUnknown);
+  if (fault == SuitFault::kNotFinite) return because(HoldReason::kSuitNotFinite, fault_joint_);
   if (fault_ == SuitFault::kJump) return because(HoldReason::kSuitJumps, fault_joint_, fault_way_);
   if (!heard_ || now - latest_.received > options_.suit_patience) {
     return because(HoldReason::kSuitSilent);

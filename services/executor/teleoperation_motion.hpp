@@ -124,7 +124,7 @@ class TeleoperationMotion {
   bool Slide(Aim& aim);
   void Coast(double elapsed_s);
   bool AtRest() const;
-  void NoteBlocked(bool went, double elapsed_s);
+  void NoteBlocked(bool blocked, double elapsed_s);
 
   const kinematics::RobotDescription& robot_;
   const std::size_t dof_;

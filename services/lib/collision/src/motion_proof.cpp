@@ -11,6 +11,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A pair that moves by no more than this between two places is not looked at more finely.
 constexpr double kSmallestMotion_m = 1e-4;
+/// From metres to that.
+constexpr std::size_t kUsualDepth = 24;
 
 /// A pair that is too near at a place of the path.
 struct Place {
@@ -36,6 +38,7 @@ class Proof {
     }
     PlaceAt(begin, impl_.proof_low);
     PlaceAt(end, impl_.proof_high);
+    Prepare();
     return Search(impl_.proof_low, impl_.proof_high, impl_.proof_pairs, 0);
   }
 
@@ -45,6 +48,21 @@ class Proof {
     path_.Position(s, impl_.proof_q);
     impl_.Place(impl_.proof_q, at);
     at.distances.assign(impl_.pairs.size(), {});
+  }
+
+  /// Makes room at once for all depths that halving comes to, whatever the first proofs need.
+  void Prepare() {
+    const std::size_t pairs = impl_.pairs.size();
+    if (!impl_.proof_levels.empty() && impl_.proof_levels.back()->unproved.capacity() >= pairs) {
+      return;
+    }
+    while (impl_.proof_levels.size() < kUsualDepth) {
+      impl_.proof_levels.push_back(std::make_unique<ProofLevel>());
+    }
+    for (const std::unique_ptr<ProofLevel>& level : impl_.proof_levels) {
+      level->middle = impl_.proof_low;
+      level->unproved.reserve(pairs);
+    }
   }
 
   ProofLevel& Level(std::size_t depth) {
