@@ -121,12 +121,108 @@ TEST_F(FaultTest, FinishesThoughTheLearningServiceIsGone) {
 }
 
 TEST_F(FaultTest, LetsOneClientMoveTheRobotAndTellsTheOtherWho) {
-  Begin(Press());
+  api::ExecuteRequest first = Press();
+  first.client = "anna-7";
+  Begin(first);
   Steps(60);
   const Result<api::ExecutionResult> second = executor_->Execute(Press(), {}, {});
   ASSERT_FALSE(second.ok());
-  EXPECT_NE(second.error().message.find("belongs to an execution of \"press\""), std::string::npos)
+  EXPECT_NE(second.error().message.find("belongs to an execution of \"press\" (anna-7)"),
+            std::string::npos)
       << second.error().message;
+  EXPECT_EQ(Finish()->state, "done");
+}
+
+TEST_F(FaultTest, PlansOnceTheRobotRestsAfterACancel) {
+  Begin(Press());
+  Steps(60);
+  ASSERT_TRUE(executor_->Cancel().ok());
+  std::future<Result<api::PlanSummary>> plan =
+      std::async(std::launch::async, [this] { return executor_->Plan(Press()); });
+  EXPECT_EQ(Finish()->state, "aborted");
+  const Result<api::PlanSummary> planned = plan.get();
+  EXPECT_TRUE(planned.ok()) << planned.error().message;
+}
+
+class ImpatientTest : public FaultTest {
+ protected:
+  static ExecutorOptions Impatient() {
+    ExecutorOptions options;
+    options.rest_patience = Duration(0);
+    return options;
+  }
+  ImpatientTest() : FaultTest(Impatient()) {}
+};
+
+TEST_F(ImpatientTest, SaysThatTheRobotStillSlowsDown) {
+  Begin(Press());
+  Steps(60);
+  ASSERT_TRUE(executor_->Cancel().ok());
+  const Result<api::PlanSummary> early = executor_->Plan(Press());
+  ASSERT_FALSE(early.ok());
+  EXPECT_EQ(early.error().message,
+            "the robot is still slowing down after an execution of \"press\", which is aborted; "
+            "ask again");
+  EXPECT_EQ(Finish()->state, "aborted");
+  EXPECT_TRUE(executor_->Plan(Press()).ok());
+}
+
+TEST_F(FaultTest, MovesOnWhileItsLogIsStuck) {
+  Begin(Press());
+  Steps(20);
+  log_.Shut(true);
+  ASSERT_TRUE(executor_->Pause().ok());
+  log_.AwaitWriter();
+  ASSERT_TRUE(executor_->Resume().ok());
+  Push(true);  // from the network, which must not wait either
+  EXPECT_TRUE(testing::Eventually([this] { return state() == "emergency_stop"; }));
+  Steps(30);
+  EXPECT_EQ(speed(), 0);
+  log_.Shut(false);
+  EXPECT_EQ(Finish()->state, "emergency_stop");
+}
+
+class HeldUpWatchTest : public FaultTest {
+ protected:
+  ExecutorOptions Held() {
+    ExecutorOptions options;
+    options.on_taken = [this, network = std::this_thread::get_id()] {
+      if (std::this_thread::get_id() == network) return;  // the listener: the rig's own thread
+      std::unique_lock lock(gate_mutex_);
+      ++waiting_;
+      gate_changed_.notify_all();
+      gate_changed_.wait(lock, [this] { return !held_; });
+      --waiting_;
+    };
+    return options;
+  }
+  HeldUpWatchTest() : FaultTest(Held()) {}
+
+  void Hold(bool held) {
+    const std::lock_guard lock(gate_mutex_);
+    held_ = held;
+    gate_changed_.notify_all();
+  }
+
+  std::mutex gate_mutex_;
+  std::condition_variable gate_changed_;
+  bool held_ = false;
+  int waiting_ = 0;
+};
+
+TEST_F(HeldUpWatchTest, TakesJointStatesThoughTheChecksOfTheLastOnesTakeLong) {
+  Begin(Press());
+  Steps(20);
+  Hold(true);
+  Step();
+  {
+    std::unique_lock lock(gate_mutex_);
+    gate_changed_.wait(lock, [this] { return waiting_ > 0; });
+  }
+  Steps(80);  // 0.64 s, in which the checks stand still
+  EXPECT_EQ(executor_->GetStatus()->state_age_s, 0);
+  EXPECT_EQ(state(), "executing");
+  Hold(false);
   EXPECT_EQ(Finish()->state, "done");
 }
 

@@ -20,6 +20,33 @@
 
 namespace exemplar::executor::test {
 
+/// A log that nobody reads; writing waits while it is shut, as to a terminal that was stopped.
+class GateLog final : public Log {
+ public:
+  void Write(LogLevel, std::string_view, Fields) override {
+    std::unique_lock lock(mutex_);
+    ++writing_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return !shut_; });
+    --writing_;
+  }
+  void Shut(bool shut) {
+    const std::lock_guard lock(mutex_);
+    shut_ = shut;
+    changed_.notify_all();
+  }
+  void AwaitWriter() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return writing_ > 0; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool shut_ = false;
+  int writing_ = 0;
+};
+
 /// The rig of most tests. Time moves only in Step.
 class RobotRig : public ::testing::Test {
  protected:
@@ -157,7 +184,7 @@ class RobotRig : public ::testing::Test {
   kinematics::RobotDescription robot_;
   scene::Description scene_;
   ManualClock clock_;
-  NullLog log_;
+  GateLog log_;
   ircp::MemoryBus bus_{clock_};
   PressSkill skills_;
   std::unique_ptr<Executor> executor_;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -42,6 +43,13 @@ const std::map<std::pair<State, Event>, State>& Taken() {
         {{S::kDone, E::kReset}, S::kIdle},
         {{S::kAborted, E::kPlan}, S::kPlanning},
         {{S::kAborted, E::kReset}, S::kIdle},
+        {{S::kIdle, E::kTeleoperate}, S::kTeleoperating},
+        {{S::kReady, E::kTeleoperate}, S::kTeleoperating},
+        {{S::kDone, E::kTeleoperate}, S::kTeleoperating},
+        {{S::kAborted, E::kTeleoperate}, S::kTeleoperating},
+        {{S::kTeleoperating, E::kLeave}, S::kDone},
+        {{S::kTeleoperating, E::kCancel}, S::kAborted},
+        {{S::kTeleoperating, E::kFault}, S::kProtectiveStop},
     };
     for (const State state : kAllStates) {
       table[{state, E::kEmergency}] = S::kEmergencyStop;
@@ -77,8 +85,10 @@ std::vector<std::pair<State, Event>> AllPairs() {
 
 INSTANTIATE_TEST_SUITE_P(Executor, EveryPair, ::testing::ValuesIn(AllPairs()),
                          [](const auto& each) {
-                           return std::string(ToString(each.param.first)) + "_" +
-                                  std::string(ToString(each.param.second));
+                           std::string name = std::string(ToString(each.param.first)) + "_" +
+                                              std::string(ToString(each.param.second));
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
                          });
 
 TEST(StateMachine, LeavesAnEmergencyByResetAlone) {

@@ -83,6 +83,76 @@ TEST(ConvertExecutor, FeedbackComesBack) {
   EXPECT_EQ(back.touch_n, feedback.touch_n);
 }
 
+TEST(ConvertExecutor, TeleoperationComesBack) {
+  const api::TeleoperationRequest request{
+      .suit = "gypsy", .touch = {"target", "block"}, .detached = true};
+  v1::TeleoperateRequest asked;
+  ToProto(request, &asked);
+  EXPECT_EQ(FromProto(asked).suit, request.suit);
+  EXPECT_EQ(FromProto(asked).touch, request.touch);
+  EXPECT_TRUE(FromProto(asked).detached);
+
+  for (const std::optional<double>& clearance : {std::optional<double>(), std::optional(0.02)}) {
+    const api::TeleoperationFeedback feedback{.state = "teleoperating",
+                                              .phase = "blocked",
+                                              .detail = "wall",
+                                              .time_s = 1,
+                                              .behind_rad = 2,
+                                              .behind_joint = "elbow",
+                                              .tracking_error_rad = 3,
+                                              .touch_n = 4,
+                                              .clearance_m = clearance,
+                                              .suit_rate_hz = 60};
+    v1::TeleoperationFeedback told;
+    ToProto(feedback, &told);
+    const api::TeleoperationFeedback back = FromProto(told);
+    EXPECT_EQ(back.state, feedback.state);
+    EXPECT_EQ(back.phase, feedback.phase);
+    EXPECT_EQ(back.detail, feedback.detail);
+    EXPECT_EQ(back.time_s, feedback.time_s);
+    EXPECT_EQ(back.behind_rad, feedback.behind_rad);
+    EXPECT_EQ(back.behind_joint, feedback.behind_joint);
+    EXPECT_EQ(back.tracking_error_rad, feedback.tracking_error_rad);
+    EXPECT_EQ(back.touch_n, feedback.touch_n);
+    EXPECT_EQ(back.clearance_m, feedback.clearance_m);
+    EXPECT_EQ(back.suit_rate_hz, feedback.suit_rate_hz);
+
+    const api::TeleoperationResult result{.state = "done",
+                                          .detail = "off",
+                                          .duration_s = 1,
+                                          .following_s = 2,
+                                          .suit_samples = 3,
+                                          .suit_samples_left_out = 4,
+                                          .commands_sent = 5,
+                                          .holds = 6,
+                                          .blocks = 7,
+                                          .tracking_error_rad = 8,
+                                          .clearance_m = clearance,
+                                          .touch_max_n = 9,
+                                          .latency_p50_s = 10,
+                                          .latency_p99_s = 11,
+                                          .latency_max_s = 12};
+    v1::TeleoperationResult ended;
+    ToProto(result, &ended);
+    const api::TeleoperationResult end = FromProto(ended);
+    EXPECT_EQ(end.state, result.state);
+    EXPECT_EQ(end.detail, result.detail);
+    EXPECT_EQ(end.duration_s, result.duration_s);
+    EXPECT_EQ(end.following_s, result.following_s);
+    EXPECT_EQ(end.suit_samples, result.suit_samples);
+    EXPECT_EQ(end.suit_samples_left_out, result.suit_samples_left_out);
+    EXPECT_EQ(end.commands_sent, result.commands_sent);
+    EXPECT_EQ(end.holds, result.holds);
+    EXPECT_EQ(end.blocks, result.blocks);
+    EXPECT_EQ(end.tracking_error_rad, result.tracking_error_rad);
+    EXPECT_EQ(end.clearance_m, result.clearance_m);
+    EXPECT_EQ(end.touch_max_n, result.touch_max_n);
+    EXPECT_EQ(end.latency_p50_s, result.latency_p50_s);
+    EXPECT_EQ(end.latency_p99_s, result.latency_p99_s);
+    EXPECT_EQ(end.latency_max_s, result.latency_max_s);
+  }
+}
+
 TEST(ConvertExecutor, ResultsComeBack) {
   Rng rng(2);
   for (int i = 0; i < 50; ++i) {
