@@ -217,7 +217,8 @@ std::optional<SeenParticipant> ReadAnnouncement(std::span<const std::uint8_t> da
   return std::nullopt;
 }
 
-Result<std::vector<SeenParticipant>> HearAnnouncements(Duration duration, std::stop_token stop) {
+Result<std::vector<SeenParticipant>> HearAnnouncements(Duration duration,
+                                                       const std::stop_token& stop) {
   const std::vector<ircp::SeenInterface> interfaces = InterfacesUp();
   std::map<int, std::unique_ptr<Socket>> by_domain;
   std::vector<pollfd> watched;
@@ -267,6 +268,7 @@ Result<std::vector<SeenParticipant>> HearAnnouncements(Duration duration, std::s
     }
   }
   std::vector<SeenParticipant> participants;
+  participants.reserve(heard.size());
   for (auto& entry : heard) participants.push_back(std::move(entry.second));
   return participants;
 }

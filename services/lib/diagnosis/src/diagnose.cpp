@@ -117,6 +117,7 @@ class Judge {
     }
     if (by_station.empty() || by_station.count(evidence_.station) != 0) return;
     std::vector<std::string> others;
+    others.reserve(by_station.size());
     for (const auto& entry : by_station) others.push_back('"' + entry.first + '"');
     Tell(evidence_.names.empty() ? Severity::kProblem : Severity::kNote, "station",
          "nobody is in station \"" + evidence_.station + "\" of domain " +
@@ -175,6 +176,7 @@ class Judge {
     const auto& interfaces = evidence_.interfaces;
     if (!interfaces.empty() && std::none_of(interfaces.begin(), interfaces.end(), carries)) {
       std::vector<std::string> why;
+      why.reserve(interfaces.size());
       for (const ircp::SeenInterface& one : interfaces) why.push_back(one.name + ": " + one.detail);
       Tell(Severity::kWarning, "transport",
            "no interface of this machine carries multicast (" + Listed(why) +

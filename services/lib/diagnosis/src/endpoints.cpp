@@ -25,6 +25,22 @@ bool IsOfAProgram(const std::string& topic) {
   return topic.ends_with("/command") || topic.ends_with("/status");
 }
 
+std::string Unmatched(const std::string& from, const Mismatch& mismatch, const std::string& to) {
+  return from + " offers " + mismatch.policy + " \"" + mismatch.offered + "\" and " + to +
+         " asks for \"" + mismatch.asked + "\": nothing is delivered";
+}
+
+std::string ApartInStations(const std::string& from, const SeenEndpoint& writer,
+                            const std::string& to, const SeenEndpoint& reader) {
+  return from + " writes in " + StationOf(writer) + " and " + to + " reads in " +
+         StationOf(reader) + ": stations do not mix";
+}
+
+std::string ApartInDomains(const std::string& from, int writes, const std::string& to, int reads) {
+  return from + " is in domain " + std::to_string(writes) + " and " + to + " in domain " +
+         std::to_string(reads) + ": domains do not hear each other";
+}
+
 struct TopicEnds {
   std::vector<const SeenEndpoint*> writers, readers;
 };
@@ -113,8 +129,7 @@ class EndpointJudge {
       Tell({"qos", from, to, mismatch.policy}, reader.topic,
            {.severity = Severity::kProblem,
             .cause = "qos",
-            .what = from + " offers " + mismatch.policy + " \"" + mismatch.offered + "\" and " +
-                    to + " asks for \"" + mismatch.asked + "\": nothing is delivered",
+            .what = Unmatched(from, mismatch, to),
             .remedy = RemedyOf(mismatch.policy),
             .policy = mismatch.policy,
             .participants = {from, to}});
@@ -173,8 +188,7 @@ class EndpointJudge {
         Tell({"station", from, to, StationOf(*writer) + '|' + StationOf(reader)}, reader.topic,
              {.severity = severity,
               .cause = "station",
-              .what = from + " writes in " + StationOf(*writer) + " and " + to + " reads in " +
-                      StationOf(reader) + ": stations do not mix",
+              .what = ApartInStations(from, *writer, to, reader),
               .remedy = writer->partitions.empty() || reader.partitions.empty()
                             ? "Let the program without a partition use one, named as the station."
                             : "Start both with the same --station.",
@@ -183,9 +197,7 @@ class EndpointJudge {
         Tell({"domain", from, to, std::to_string(writer->domain)}, reader.topic,
              {.severity = severity,
               .cause = "domain",
-              .what = from + " is in domain " + std::to_string(writer->domain) + " and " + to +
-                      " in domain " + std::to_string(reader.domain) +
-                      ": domains do not hear each other",
+              .what = ApartInDomains(from, writer->domain, to, reader.domain),
               .remedy = "Start both with the same --domain.",
               .participants = {from, to}});
       }

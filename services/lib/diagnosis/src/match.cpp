@@ -34,6 +34,7 @@ constexpr std::array kRepresentation{"XCDR1", "XML", "XCDR2"};
 
 std::string Representations(const std::vector<int>& ids) {
   std::vector<std::string> words;
+  words.reserve(ids.size());
   for (const int id : ids) words.push_back(Word(kRepresentation, id));
   return words.empty() ? "XCDR1" : Join(words, ", ");
 }

@@ -31,7 +31,7 @@ std::set<int> DomainsOfThisMachine();
 /// Hears the announcements of all domains by multicast for `duration`, without answering. Errors:
 /// no socket can be made.
 Result<std::vector<ircp::SeenParticipant>> HearAnnouncements(Duration duration,
-                                                             std::stop_token stop);
+                                                             const std::stop_token& stop);
 /// One announcement as it lies in a datagram (RTPS 2.2, 8.5.3.2); nullopt for other datagrams.
 std::optional<ircp::SeenParticipant> ReadAnnouncement(std::span<const std::uint8_t> datagram);
 
