@@ -29,7 +29,7 @@ from processes import Failure, System, wait_until  # noqa: E402
 from workspace import REGIONS, SKILL, TRIALS, Place, scene_for, write_trial  # noqa: E402
 
 SPEEDS_M_S = (0.0, 0.05, 0.1, 0.2)
-RAIL_M = 0.3
+RAIL_M = 0.4
 # Where the middle of the rail is (m, base frame), and how far its direction is turned from the table's y.
 MIDDLE = ((0.45, 0.6), (-0.12, 0.02), (0.04, 0.08))
 LARGEST_TURN_RAD = 0.3
@@ -51,6 +51,11 @@ class Cart:
     def scene(self, speed_m_s):
         words = ", ".join(f"{part:.9g}" for part in self.direction)
         return scene_for(self.place) + f"    rail: {{direction: [{words}], length: {RAIL_M}, speed: {speed_m_s}}}\n"
+
+
+def said(done):
+    """What matters of an execution that went through."""
+    return {name: done.get(name) for name in ("state", "detail", "contact_error_m", "touch_max_n", "clearance_m")}
 
 
 class Bench:
@@ -106,7 +111,7 @@ class Bench:
             if clicks > 0 and done.get("state") == "done":
                 return {"outcome": "clicked", "error_m": done.get("contact_error_m")}
             outcome = "clicked, then stopped" if clicks > 0 else "no click" if done.get("state") == "done" else "stopped"
-            print(f"{speed} m/s {number}: {outcome}: {detail or done}", file=sys.stderr, flush=True)
+            print(f"{speed} m/s {number}: {outcome}: {detail or said(done)}", file=sys.stderr, flush=True)
             return {"outcome": outcome, "error_m": done.get("contact_error_m")}
         finally:
             system.stop()
