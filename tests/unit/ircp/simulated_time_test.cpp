@@ -86,6 +86,17 @@ TEST_F(SimulatedTime, DoesNotWaitForAThreadThatHasLeftItsLoop) {
   EXPECT_TRUE(Lead(*leader, milliseconds(2)));
 }
 
+TEST_F(SimulatedTime, DoesNotWaitForAThreadWhoseSleepWasStopped) {
+  const auto clock = MakeClock("executor", {.patience = std::chrono::hours(1)});
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  stop_.request_stop();
+  std::thread([&] {
+    EXPECT_TRUE(clock->SleepUntil(milliseconds(0), {}));
+    EXPECT_FALSE(clock->SleepUntil(Duration::max(), stop_.get_token()));
+  }).join();
+  EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, kTakenAll, {}));
+}
+
 TEST_F(SimulatedTime, WaitsForAFollowerThatComesLater) {
   const auto leader = MakeLeader({.in_step_with = {"executor"}});
   std::atomic<bool> moved{false};

@@ -33,8 +33,8 @@ struct SentInputs {
 
 struct NetworkClockOptions {
   /// A thread that a moment woke and that does not sleep again has left its loop: nobody waits for
-  /// it longer than so long (of real time).
-  Duration patience = std::chrono::milliseconds(500);
+  /// it longer than so long (of real time). Not at all once a stop has ended a sleep of its.
+  Duration patience = std::chrono::seconds(2);
   /// What the leader has sent is waited for no longer than so long (of real time).
   Duration input_patience = std::chrono::seconds(5);
   /// False: nothing is answered before SetInputsTaken, so that time waits for a program that is not
