@@ -37,6 +37,9 @@ class Show final : public ircp::RawOutlet {
       link_->Say(StatusLevel::kError, "there is no channel of id " + std::to_string(one.channel));
     } else if (const Status done = link_->Subscribe(one); !done.ok()) {
       link_->Say(StatusLevel::kError, done.error().message);
+    } else if (!steered_ && paused_) {
+      paused_ = false;
+      if (player_ != nullptr) player_->Resume();
     }
   }
 
@@ -133,7 +136,7 @@ class Show final : public ircp::RawOutlet {
       if (change.come) ids_[entry.second.topic] = change.come->id;
     }
     steered_ = link_->socket().subprotocol() == kSdkV1;
-    paused_ = steered_;
+    paused_ = true;
     return {};
   }
 

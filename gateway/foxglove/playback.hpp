@@ -21,7 +21,8 @@ struct PlaybackOptions {
 /// Nothing of it goes over the station's network: a recording's messages reach the client who
 /// opened it, with their own times, on channels of their own. A client of foxglove.sdk.v1 begins
 /// paused and steers (capability "playbackControl"); one of foxglove.websocket.v1 sees it played
-/// once. The HTTP server that has the endpoint stops before the playback goes. Thread-safe.
+/// once, from its first subscription on. The HTTP server that has the endpoint stops before the
+/// playback goes. Thread-safe.
 class Playback {
  public:
   /// Clock and log outlive it.

@@ -58,7 +58,7 @@ class DepthCheck final : public nlohmann::json_sax<Json> {
 class Members {
  public:
   Members(const Json& object, std::string place) : object_(object), place_(std::move(place)) {
-    if (!object.is_object()) Fail(place_, "an object");
+    if (!object.is_object()) Fail(place_.empty() ? "the message" : place_, "an object");
   }
 
   std::uint32_t Number(const char* name) {
@@ -119,6 +119,10 @@ class Members {
   void Fail(const std::string& place, const std::string& must_be) {
     if (error_.empty()) error_ = place + " must be " + must_be;
   }
+  /// What is wrong with a part is wrong with the whole.
+  void Adopt(const Members& part) {
+    if (error_.empty()) error_ = part.error_;
+  }
   const std::string& error() const { return error_; }
 
  private:
@@ -143,7 +147,7 @@ ClientMessage ReadSubscribe(Members& members) {
   members.Each("subscriptions", [&](const Json& entry, const std::string& place) {
     Members one(entry, place + ".");
     op.subscriptions.push_back({one.Number("id"), one.Number("channelId")});
-    if (!one.error().empty()) members.Fail("", one.error());
+    members.Adopt(one);
   });
   return op;
 }
@@ -154,7 +158,7 @@ ClientMessage ReadAdvertise(Members& members) {
     Members one(entry, place + ".");
     op.channels.push_back({one.Number("id"), one.Text("topic", true), one.Text("encoding", true),
                            one.Text("schemaName", true), one.Text("schema", false)});
-    if (!one.error().empty()) members.Fail("", one.error());
+    members.Adopt(one);
   });
   return op;
 }

@@ -41,7 +41,8 @@ TEST(ClientText, IsReadAsTheProtocolHasIt) {
 TEST(ClientText, IsRefusedWithTheMemberAtFault) {
   EXPECT_EQ(WhyNot("{"), "not JSON at byte 2");
   EXPECT_EQ(WhyNot(""), "not JSON at byte 1");
-  EXPECT_EQ(WhyNot("[]"), "op must be there");
+  EXPECT_EQ(WhyNot("[]"), "the message must be an object");
+  EXPECT_EQ(WhyNot("{}"), "op must be there");
   EXPECT_EQ(WhyNot(R"({"op":3})"), "op must be a string");
   EXPECT_EQ(WhyNot(R"({"op":"dance"})"), "op \"dance\" is not known");
   EXPECT_EQ(WhyNot(R"({"op":"subscribe"})"), "subscriptions must be an array");
