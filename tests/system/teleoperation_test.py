@@ -63,9 +63,9 @@ class TeleoperationTest(unittest.TestCase):
         self.wait_said("holding")
         return process
 
-    def wait_said(self, words, limit_s=25):
+    def wait_said(self, words, times=1, limit_s=25):
         try:
-            wait_for(lambda: words in self.said.read_text(), f'"{words}"', limit_s)
+            wait_for(lambda: self.said.read_text().count(words) >= times, f'"{words}"', limit_s)
         except AssertionError as missing:
             raise AssertionError(f"{missing}: {self.said.read_text()}\n{self.programs.logs()}") from None
 
@@ -144,7 +144,7 @@ class TeleoperationTest(unittest.TestCase):
         self.assertLess(self.still(), 0.01)
         # The whole capture program stops: neither suit nor dead-man is heard any more.
         capture = self.capture(self.wave(name="long", seconds=30))
-        wait_for(lambda: self.said.read_text().count("following: ") > 1, "following once more")
+        self.wait_said("following: ", times=2)
         capture.send_signal(signal.SIGSTOP)
         self.wait_said("holding: nothing")
         time.sleep(0.5)
@@ -170,21 +170,22 @@ class TeleoperationTest(unittest.TestCase):
         self.programs.running[-1].terminate()
         self.programs.running[-1].wait(10)
 
-        far = dict(HOME, right_shoulder_in_out=HOME["right_shoulder_in_out"] - 1.25)
+        far = dict(HOME, right_elbow_in_out=HOME["right_elbow_in_out"] - 1.4)
         self.capture(self.trial("far", lambda t: {}, 1, joints=far))
-        self.wait_said("holding: the operator's posture is 1.25 rad away at joint \"right_shoulder_in_out\"")
+        self.wait_said("holding: the operator's posture is 1.")
         self.programs.running[-1].terminate()
         self.programs.running[-1].wait(10)
 
         # Numbers that are none never come as far as the robot: they are refused where they arrive.
         suit = self.capture(self.wave(name="before_nan", seconds=30))
-        self.wait_said("following")
+        self.wait_said("following: ", times=2)
         suit.send_signal(signal.SIGSTOP)
         self.wait_said("holding: nothing")
         suit.kill()
         nan = self.folder / "nan.mcap"
         nan.write_bytes(suit_recording(20))
-        exemplar("record", "replay", nan, "--domain", DOMAIN, "--station", "test")
+        exemplar("record", "recover", nan)
+        exemplar("record", "replay", self.folder / "nan.recovered.mcap", "--domain", DOMAIN, "--station", "test")
         self.assertIsNone(self.executor.poll(), self.programs.logs())
         self.assertIn("not a finite number", self.programs.logs())
         self.assertLess(self.still(), 0.01)
