@@ -458,9 +458,9 @@ TEST_F(StepTest, StopsAtTheClearanceAndComesBackOutWhenTheOperatorDrawsBack) {
   double smallest = 1;
   operator_velocity_[1] = 1.0;
   const double begin = operator_[1];
-  for (int i = 0; i < 150; ++i) {
-    operator_[1] = begin + operator_velocity_[1] * kStep_s * std::min(i, 115);
-    if (i == 115) operator_velocity_.setZero();
+  for (int i = 0; i < 190; ++i) {
+    operator_[1] = begin + operator_velocity_[1] * kStep_s * std::min(i, 140);
+    if (i == 140) operator_velocity_.setZero();
     Step();
     smallest = std::min(smallest, Clearance());
   }
@@ -559,9 +559,10 @@ TEST_F(StepTest, NeitherTakesNorStepsWithAllocation) {
   // Down to the table, blocked there, and up again: the second time without an allocation.
   for (int round = 0; round < 2; ++round) {
     const test::AllocationCount allocations;
-    run(140, 0.8);
+    run(175, 0.8);
     run(60, 0);
-    run(140, -0.8);
+    run(175, -0.8);
+    run(100, 0);
     allocated = allocations.count();
   }
   EXPECT_EQ(allocated, 0);
