@@ -17,7 +17,7 @@ OUTSIDE = {
     "MuJoCo": (r"<mujoco/", ["services/simulator"]),
     "SQLite": (r"<sqlite3", ["services/learning"]),
     "CLI11": (r"<CLI/", ["services/lib/program", "clients/cli"]),
-    "OpenSSL": (r"<openssl/", ["services/lib/security"]),
+    "OpenSSL": (r"<openssl/", ["services/lib/security", "services/lib/http"]),
     "spdlog": (r"<spdlog/", ["services/lib/program"]),
     "Boost": (r"<boost/", ["services/lib/http"]),
 }

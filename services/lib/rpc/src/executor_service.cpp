@@ -94,24 +94,26 @@ class ExecutorService final : public v1::ExecutorService::Service {
 
   grpc::Status Execute(grpc::ServerContext* context, const v1::ExecuteRequest* request,
                        grpc::ServerWriter<v1::ExecuteResponse>* writer) override {
-    return Serve(shared_, *context, "exemplar.v1.ExecutorService/Execute", request->execution().skill().name(), [&]() -> Status {
-      Result<api::ExecuteRequest> execution = FromProto(request->execution(), "execution");
-      if (!execution) return execution.error();
-      execution->client = WhoCalls(*context);
-      if (request->detached()) return PutResult(BeginMotion(*execution), writer);
-      CancellationWatch watch(shared_, *context);
-      LatestWriter<v1::ExecuteResponse> feedback(*writer, watch);
-      const Result<api::ExecutionResult> result = executor_.Execute(
-          *execution,
-          [&](const api::ExecutionFeedback& now) {
-            v1::ExecuteResponse message;
-            ToProto(now, message.mutable_feedback());
-            feedback.Post(std::move(message));
-          },
-          watch.token());
-      feedback.Finish();
-      return PutResult(result, writer);
-    });
+    return Serve(shared_, *context, "exemplar.v1.ExecutorService/Execute",
+                 request->execution().skill().name(), [&]() -> Status {
+                   Result<api::ExecuteRequest> execution =
+                       FromProto(request->execution(), "execution");
+                   if (!execution) return execution.error();
+                   execution->client = WhoCalls(*context);
+                   if (request->detached()) return PutResult(BeginMotion(*execution), writer);
+                   CancellationWatch watch(shared_, *context);
+                   LatestWriter<v1::ExecuteResponse> feedback(*writer, watch);
+                   const Result<api::ExecutionResult> result = executor_.Execute(
+                       *execution,
+                       [&](const api::ExecutionFeedback& now) {
+                         v1::ExecuteResponse message;
+                         ToProto(now, message.mutable_feedback());
+                         feedback.Post(std::move(message));
+                       },
+                       watch.token());
+                   feedback.Finish();
+                   return PutResult(result, writer);
+                 });
   }
 
   grpc::Status GetStatus(grpc::ServerContext* context, const v1::GetRobotStatusRequest*,
