@@ -34,7 +34,13 @@ class Recorder final : public api::RecorderApi {
   Result<api::RecorderStatus> Pause() override { return Said("paused"); }
   Result<api::RecorderStatus> Resume() override { return Said("recording"); }
   Result<api::RecorderStatus> MarkEvent(const api::RecordEvent&) override { return Said("marked"); }
-  Result<api::RecorderStatus> GetStatus() override { return Said("ready"); }
+  /// Waits while the test holds `hold`.
+  Result<api::RecorderStatus> GetStatus() override {
+    const std::lock_guard lock(hold);
+    return Said("ready");
+  }
+
+  std::mutex hold;
 
  private:
   static api::RecorderStatus Said(const std::string& state) {
@@ -357,6 +363,19 @@ TEST_F(SecurityTest, CallersWhoCallTooOftenAreHeldBackAloneOfAll) {
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::kResourceExhausted);
   EXPECT_TRUE(Ask({.token = calm}).ok());
+}
+
+TEST_F(SecurityTest, ShortCallsThatTakeTooLongAreCancelled) {
+  Start({.max_call = std::chrono::milliseconds(50)});
+  {
+    const std::lock_guard held(recorder_.hold);
+    const auto status = Ask({});
+    ASSERT_FALSE(status.ok());
+    EXPECT_EQ(status.error().code, ErrorCode::kCancelled);
+  }
+  server_->Shutdown(std::chrono::seconds(20));
+  ASSERT_FALSE(calls_.empty());
+  EXPECT_EQ(calls_.back().outcome, "deadline_exceeded");
 }
 
 TEST_F(SecurityTest, TokensDoNotCrossANetworkInPlainText) {
