@@ -160,6 +160,12 @@ Result<FollowingPlan> FollowingPlanner::Plan(const api::ExecuteRequest& request,
       if (round + 1 < kRounds) continue;
       return Unavailable("target \"" + *target + "\" cannot be followed: planning takes too long");
     }
+    // The target is not where the scene has it while the tool goes along with it.
+    for (motion::TouchWindow& touch : plan->planned.motion.touches) {
+      if (touch.object != *target || track.speed() == 0) continue;
+      touch.begin_s = std::min(touch.begin_s, plan->times.begin_s());
+      touch.end_s = std::max(touch.end_s, plan->times.end_s());
+    }
     plan->path = MakeFollowedPath(robot_.chain, plan->planned.motion.trajectory, plan->times, track,
                                   plan->start);
     (void)Prove(robot_, plan->planned.checker, plan->planned.motion, required_clearance_m(), 0,
