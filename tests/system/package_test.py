@@ -35,7 +35,7 @@ class PackageTest(unittest.TestCase):
         cls.folder.chmod(0o777)
         for old in (BINARIES.parent / "packages").glob("*.deb"):
             old.unlink()
-        cls.packages = [pathlib.Path(line) for line in run(ROOT / "deploy" / "package", BINARIES.parent, timeout=600).split()]
+        cls.packages = [pathlib.Path(line) for line in run(ROOT / "deploy" / "package", BINARIES.parent, timeout=1800).split()]
         for package in cls.packages:
             shutil.copy(package, cls.folder)
         trials.write_set(cls.folder / "trials", [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06)])
