@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <future>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -10,6 +11,7 @@
 #include "commands.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/discovery.hpp"
 #include "exemplar/diagnosis/diagnose.hpp"
 #include "exemplar/ircp/clock_watch.hpp"
@@ -39,6 +41,26 @@ struct Words {
 
 bool IsOwn(const ircp::SeenParticipant& participant) {
   return participant.name.starts_with("exemplar-doctor");
+}
+
+template <class... Samples>
+std::map<std::string, std::string, std::less<>> SchemasOf() {
+  return {{std::string(bus::TypeNameOf<Samples>()), std::string(bus::SchemaOf<Samples>())}...};
+}
+
+/// Writers carry the members of their type; of readers they are taken to be as this version has
+/// them.
+void AddSchemas(std::vector<ircp::SeenEndpoint>& endpoints) {
+  const auto schemas =
+      SchemasOf<ircp::SuitSample, ircp::EndEffectorSample, ircp::TactileSample, ircp::CameraSample,
+                ircp::ObjectSample, ircp::JointStateSample, ircp::JointCommandSample,
+                ircp::CommandSample, ircp::StatusSample, ircp::SafetySample, ircp::ClockSample>();
+  for (ircp::SeenEndpoint& endpoint : endpoints) {
+    const auto known = schemas.find(endpoint.type);
+    if (!endpoint.writer && endpoint.schema.empty() && known != schemas.end()) {
+      endpoint.schema = known->second;
+    }
+  }
 }
 
 /// Adds participants that only their announcements told of.
@@ -113,6 +135,7 @@ Result<Evidence> Observe(const bus::ParticipantOptions& network, const Words& wo
   std::erase_if(evidence.discovery.endpoints, [&](const ircp::SeenEndpoint& endpoint) {
     return own.count(endpoint.participant) != 0;
   });
+  AddSchemas(evidence.discovery.endpoints);
   evidence.interfaces = bus::TryMulticast();
   std::vector<ircp::SeenParticipant> here;
   for (const ircp::SeenParticipant& one : evidence.discovery.participants) {

@@ -38,7 +38,7 @@ class ServicesTest(unittest.TestCase):
         cls.learning = cls.server("exemplar-learning", "--data-dir", cls.folder / "skills", "--robot", ROBOT, bus=False)
         cls.recorder = cls.server("exemplar-recorder", "--data-dir", cls.folder / "recordings")
         cls.programs.start("exemplar-reference-driver", "--robot", ROBOT)
-        cls.executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", scene, "--learning", cls.learning, "--guard-touch-n", "0")
+        cls.executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", scene, "--learning", cls.learning, "--guard-touch-n", "0", "--state-patience-s", "5", "--command-patience-s", "5")
         wait_for(lambda: exemplar("--server", cls.executor, "robot", "status").get("joint_names"), "the driver's joint state")
 
     @classmethod

@@ -9,6 +9,7 @@ import pathlib
 import re
 import shutil
 import signal
+import struct
 import subprocess
 import tempfile
 import time
@@ -156,6 +157,32 @@ class MismatchTest(Case):
         problem = self.assert_problem(doctor(*HERE), "qos", DRIVER, EXECUTOR, "best effort", "ircp/joint_state")
         self.assertEqual((problem["policy"], problem["topic"]), ("reliability", "ircp/joint_state"))
         self.assertIn("--best-effort", problem["remedy"])
+
+    def replay(self, type_name, schema):
+        """Writes another type on ircp/joint_state: a recording that somebody made elsewhere, played for 20 s."""
+        text = lambda word: struct.pack("<I", len(word)) + word.encode()
+        record = lambda opcode, data: struct.pack("<BQ", opcode, len(data)) + data
+        out = b"\x89MCAP0\r\n" + record(1, text("") + text("a test"))
+        out += record(3, struct.pack("<H", 1) + text(type_name) + text("omgidl") + text(schema))
+        out += record(4, struct.pack("<HH", 1, 1) + text("ircp/joint_state") + text("cdr") + struct.pack("<I", 0))
+        for i in range(3):
+            now = 1_700_000_000_000_000_000 + i * 10_000_000_000
+            out += record(5, struct.pack("<HIQQ", 1, i, now, now) + struct.pack("<II", 0x100, i))
+        file = self.folder / "other.mcap"
+        # Cut within its last record: `record recover` makes it whole.
+        file.write_bytes(out[:-5])
+        self.assertEqual(run("record", "recover", file).returncode, 0)
+        self.programs.start("exemplar", "record", "replay", file.with_suffix(".recovered.mcap"), "--topic", "ircp/joint_state", "--wait", "0.1")
+
+    def test_types_that_differ_are_named(self):
+        self.executor()
+        self.replay("Other", "struct Other { long n; };")
+        self.assert_problem(doctor(*HERE), "type", "writes the type Other", EXECUTOR, "JointState")
+
+    def test_members_that_differ_are_named(self):
+        self.executor()
+        self.replay("exemplar::ircp::v1::JointState", "module exemplar { module ircp { module v1 { struct JointState { @key long n; }; }; }; };")
+        self.assert_problem(doctor(*HERE), "type", EXECUTOR)
 
     @unittest.skipUnless(FAKETIME.exists(), "faketime is not installed")
     def test_a_clock_that_is_wrong_is_named(self):
