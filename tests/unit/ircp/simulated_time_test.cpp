@@ -134,6 +134,8 @@ TEST_F(SimulatedTime, WaitsForCommandsOnTheirWay) {
 
 TEST_F(SimulatedTime, ComesWhenWhatWasSentBeforeIsTakenIn) {
   const auto clock = MakeClock();
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  ASSERT_TRUE(Lead(*leader, milliseconds(0)));
   std::atomic<std::uint64_t> states{0};
   std::atomic<int> asked{0};
   clock->SetInputsTaken([&](const SentInputs& sent) {
@@ -141,7 +143,6 @@ TEST_F(SimulatedTime, ComesWhenWhatWasSentBeforeIsTakenIn) {
     ++asked;
     return states >= sent.joint_states;
   });
-  const auto leader = MakeLeader({.in_step_with = {"executor"}});
   std::atomic<bool> reached{false};
   const std::jthread leading([&] {
     EXPECT_TRUE(leader->Lead(milliseconds(8), Stamp(), {.joint_states = 2, .objects = 9}, kTakenAll,
@@ -179,8 +180,9 @@ TEST_F(SimulatedTime, WaitsForAProgramUntilItIsComplete) {
 
 TEST_F(SimulatedTime, IsNotHeldUpByASampleThatNeverComes) {
   const auto clock = MakeClock("executor", {.input_patience = milliseconds(1)});
-  clock->SetInputsTaken([](const SentInputs&) { return false; });
   const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  ASSERT_TRUE(Lead(*leader, milliseconds(0)));
+  clock->SetInputsTaken([](const SentInputs&) { return false; });
   EXPECT_TRUE(Lead(*leader, milliseconds(1)));
   EXPECT_EQ(clock->Steady(), milliseconds(1));
   clock->SetInputsTaken(nullptr);
