@@ -59,7 +59,7 @@ Result<api::TeleoperationResult> Executor::Teleoperate(
     }
     last_command = last_command_;
   }
-  return teleoperation_->Run(request, feedback, std::move(stop), last_command);
+  return teleoperation_->Run(request, feedback, stop, last_command);
 }
 
 Status Executor::EndTeleoperation() { return teleoperation_->End(); }

@@ -135,8 +135,8 @@ Result<Teleoperation::Session> Teleoperation::Prepare(
 
 Result<api::TeleoperationResult> Teleoperation::Run(
     const api::TeleoperationRequest& request,
-    const std::function<void(const api::TeleoperationFeedback&)>& feedback, std::stop_token stop,
-    const std::optional<Eigen::VectorXd>& last_command) {
+    const std::function<void(const api::TeleoperationFeedback&)>& feedback,
+    const std::stop_token& stop, const std::optional<Eigen::VectorXd>& last_command) {
   const std::unique_lock run(run_mutex_, std::try_to_lock);
   if (!run.owns_lock()) return Busy();
   Result<Session> session = Prepare(request, last_command);

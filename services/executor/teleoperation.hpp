@@ -78,8 +78,8 @@ class Teleoperation {
   /// `last_command`: where the robot was told to be, where it was told anything.
   Result<api::TeleoperationResult> Run(
       const api::TeleoperationRequest& request,
-      const std::function<void(const api::TeleoperationFeedback&)>& feedback, std::stop_token stop,
-      const std::optional<Eigen::VectorXd>& last_command);
+      const std::function<void(const api::TeleoperationFeedback&)>& feedback,
+      const std::stop_token& stop, const std::optional<Eigen::VectorXd>& last_command);
   Status End();
   /// The robot is commanded from here, also while it comes to rest after the mode was left.
   bool active() const { return session_.load() == kActive; }

@@ -242,11 +242,9 @@ class ExecutorApi {
   /// The robot follows ircp/suit while the dead-man on ircp/safety is held. Returns when the mode
   /// has ended and the robot rests. Feedback comes about ten times a second.
   virtual Result<TeleoperationResult> Teleoperate(
-      const TeleoperationRequest& request,
-      const std::function<void(const TeleoperationFeedback&)>& feedback, std::stop_token stop) {
-    static_cast<void>(request);
-    static_cast<void>(feedback);
-    static_cast<void>(stop);
+      const TeleoperationRequest& /*request*/,
+      const std::function<void(const TeleoperationFeedback&)>& /*feedback*/,
+      std::stop_token /*stop*/) {
     return FailedPrecondition("this executor cannot be teleoperated");
   }
   virtual Status EndTeleoperation() {
