@@ -81,6 +81,8 @@ class SameRunTest(unittest.TestCase):
         run = Run(self.folder / name, "94", *words)
         try:
             exemplar("record", "start", "--name", "run", "--server", run.recorder)
+            topics = lambda: {topic["topic"] for topic in exemplar("record", "status", "--server", run.recorder)["topics"]}
+            wait_for(lambda: topics() >= set(COMPARED), "the recorder to find the topics")
             took = [run.press(PLACE), run.press(PLACE)]  # the second one from where the first ended
             exemplar("record", "stop", "--server", run.recorder)
         finally:
