@@ -27,8 +27,9 @@ constexpr double kFree_s = 0.1;
 /// Bodies within so much more than the clearance turn the motion aside.
 constexpr double kSlideWithin_m = 0.01;
 constexpr double kStill_rad_s = 1e-3;
-/// Who is too near already may come so much nearer still: what rounds.
-constexpr double kRounding_m = 1e-4;
+/// Who is at the clearance, or nearer already, may come so much nearer still: what proofs round,
+/// who tell ways apart down to twice that.
+constexpr double kRounding_m = 6e-5;
 
 }  // namespace
 
@@ -315,8 +316,9 @@ bool TeleoperationMotion::KeepsClear(const Motions& next,
   }
   path.Position(0, full_);
   const double now_m = checker_->SmallestDistance(full_, touches_);
-  if (now_m >= options_.clearance_m) return false;
-  nearest_m_ = std::max(nearest_m_, now_m);
+  // At the clearance itself nothing could be proved, not even the way out.
+  if (now_m >= options_.clearance_m + 2 * kRounding_m) return false;
+  nearest_m_ = std::max(nearest_m_, std::min(now_m, options_.clearance_m));
   return checker_->KeepsClear(path, 0, end, nearest_m_ - kRounding_m, touches_);
 }
 
