@@ -46,7 +46,7 @@ class GatewayTest(unittest.TestCase):
             "exemplar-gateway", "--learning", learning, "--executor", executor, "--recorder", recorder,
             "--http", "127.0.0.1:0", "--http-port-file", http_port, "--publish", "ircp/suit",
         )  # fmt: skip
-        wait_for(http_port.exists, "the gateway's HTTP port")
+        wait_for(lambda: http_port.exists() and http_port.read_text().strip(), "the gateway's HTTP port")
         cls.http = "http://127.0.0.1:" + http_port.read_text().strip()
         cls.files = trials.write_set(cls.folder / "trials", BUTTONS)
         cls.cli("trial", "submit", "--skill", "press", *cls.files)

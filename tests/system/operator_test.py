@@ -191,7 +191,7 @@ class RunningTest(unittest.TestCase):
         configs = {
             "recorder": {"data-dir": cls.folder / "recordings"},
             "executor": {"robot": ROBOT, "scene": RAIL, "learning": f"127.0.0.1:{learning.port()}"},
-            "gateway": {"http": "127.0.0.1:0"},
+            "gateway": {"learning": f"127.0.0.1:{learning.port()}", "http": "127.0.0.1:0"},
             "simulator": {"robot": ROBOT, "scene": RAIL, "cameras": "off"},
             "capture-tactile": {"from-robot": "true", "rate-hz": 60},
             "capture-vision": {"scene": TABLE},

@@ -10,8 +10,8 @@ namespace exemplar::learning {
 /// nullopt when it moves. Precondition: the series is not empty.
 std::optional<geometry::Pose> StaticPose(const demonstration::PoseSeries& series, double extent_m);
 
-/// Where a thing stood that a hand takes away: it stands still at first, for half a second at least,
-/// and still again at the end. nullopt otherwise. Precondition: the series is not empty.
+/// Where a thing stood that a hand takes away: it stands still at first, for half a second at
+/// least, and still again at the end. nullopt otherwise. Precondition: the series is not empty.
 std::optional<geometry::Pose> TakenFrom(const demonstration::PoseSeries& series, double extent_m);
 
 }  // namespace exemplar::learning

@@ -63,7 +63,11 @@ class HealthWatch::Call final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
   }
   void OnReadDone(bool ok) override {
     if (!ok) return;
-    state_->Tell(SaysServing(answer_));
+    const bool serving = SaysServing(answer_);
+    state_->Tell(serving);
+    // A server that goes waits for its last call: not for this one.
+    if (served_ && !serving) context_.TryCancel();
+    served_ = serving;
     StartRead(&answer_);
   }
   void OnDone(const grpc::Status& status) override {
@@ -88,6 +92,7 @@ class HealthWatch::Call final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
   grpc::ClientContext context_;
   grpc::ByteBuffer request_{nullptr, 0};  ///< of the server as a whole
   grpc::ByteBuffer answer_;
+  bool served_ = false;
 };
 
 HealthWatch::HealthWatch(std::shared_ptr<Connection> connection,

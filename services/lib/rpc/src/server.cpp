@@ -123,6 +123,8 @@ class GrpcServer final : public Server {
   void Shutdown(Duration grace) override {
     shared_.shutdown().request_stop();
     if (proxy_) proxy_->Stop();
+    // Those who watch the health let go, so that nobody waits for them.
+    if (auto* health = server_->GetHealthCheckService()) health->Shutdown();
     server_->Shutdown(std::chrono::system_clock::now() +
                       std::chrono::duration_cast<std::chrono::system_clock::duration>(grace));
   }

@@ -22,7 +22,7 @@ struct ParticipantOptions {
   std::string station = "default";  ///< the partition of all its topics
   /// Instead of a station: its topics lie in no partition, where other middlewares' do by default.
   bool without_station = false;
-  std::string name = "exemplar";    ///< as discovery tools show it
+  std::string name = "exemplar";  ///< as discovery tools show it
   /// Addresses or names ("127.0.0.1", "eth1") of the interfaces to use; empty: all.
   std::vector<std::string> interfaces = {};
   /// IPv4 addresses where other participants are sought beside multicast. The own machine is always

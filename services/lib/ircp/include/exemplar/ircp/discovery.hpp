@@ -55,7 +55,7 @@ struct SeenEndpoint {
   bool writer = false;
   std::string topic{};
   std::string type{};
-  std::string schema{};                 ///< flattened IDL where it carries one
+  std::string schema{};                   ///< flattened IDL where it carries one
   std::vector<std::string> partitions{};  ///< empty: the one without a name
   bool keyed = false;
   EndpointQos qos;
