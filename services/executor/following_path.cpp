@@ -122,8 +122,10 @@ class Swept final : public collision::JointPath {
 }  // namespace
 
 double TargetTimes::ShareAt(double time_s) const {
-  return SmoothStep(time_s, contact_s - kShareFrom_s, contact_s - kShareTo_s).value *
-         (1 - SmoothStep(time_s, release_s + kShareAfter_s, release_s + kShareGone_s).value);
+  const double share =
+      SmoothStep(time_s, contact_s - kShareFrom_s, contact_s - kShareTo_s).value *
+      (1 - SmoothStep(time_s, release_s + kShareAfter_s, release_s + kShareGone_s).value);
+  return std::clamp(share, 0.0, 1.0);
 }
 
 double TargetTimes::begin_s() const { return contact_s - kShareFrom_s; }

@@ -101,6 +101,7 @@ void TeleoperationMotion::Begin(const Eigen::Ref<const Eigen::VectorXd>& start,
   driven_.reset();
   nearest_m_ = kNever;
   share_ = 1;
+  out_ = false;
   braked_s_ = longest_brake_s_ = 0;
   for (std::size_t j = 0; j < dof_; ++j) {
     at_[j] = {start[static_cast<Eigen::Index>(j)], 0, 0};
@@ -260,8 +261,21 @@ TeleoperationMotion::Aim TeleoperationMotion::AimAt(Duration now) const {
 
 void TeleoperationMotion::Pursue(const StepInput& input) {
   Aim aim = AimAt(input.now);
+  if (out_) {
+    out_ = LeadsOut(aim) && Try(aim, input, /*together=*/true);
+    if (out_) {
+      share_ = std::min(1.0, share_ + kShareGrowth_per_s * input.elapsed_s);
+      return NoteBlocked(false, input.elapsed_s);
+    }
+  }
   if (Try(aim, input)) {
     share_ = std::min(1.0, share_ + kShareGrowth_per_s * input.elapsed_s);
+    return NoteBlocked(false, input.elapsed_s);
+  }
+  // Joints that set off each as quickly as it may begin with coming nearer; together they go
+  // straight.
+  if (AtRest() && LeadsOut(aim) && Try(aim, input, /*together=*/true)) {
+    out_ = true;
     return NoteBlocked(false, input.elapsed_s);
   }
   NoteBlocked(true, input.elapsed_s);
@@ -270,13 +284,23 @@ void TeleoperationMotion::Pursue(const StepInput& input) {
   Coast(input.elapsed_s);
 }
 
-bool TeleoperationMotion::Try(const Aim& aim, const StepInput& input) {
+bool TeleoperationMotion::Try(const Aim& aim, const StepInput& input, bool together) {
   const bool slow = phase_ != Phase::kFollowing;
   const double share = share_ * input.speed * (slow ? options_.approach_share : 1.0);
+  double longest_way = 0;
+  for (std::size_t j = 0; together && j < dof_; ++j) {
+    longest_way = std::max(longest_way, std::abs(aim.position[j] - at_[j].position));
+  }
   double longest_s = 0;
   for (std::size_t j = 0; j < dof_; ++j) {
     FollowLimits limits = limits_[j];
     limits.velocity *= share;
+    if (longest_way > 0) {
+      const double part = std::abs(aim.position[j] - at_[j].position) / longest_way;
+      limits.velocity *= part;
+      limits.acceleration *= part;
+      limits.jerk *= part;
+    }
     next_[j] = Follow(at_[j], aim.position[j], aim.velocity[j], limits, input.elapsed_s);
     next_brakes_[j] = Brake(next_[j], limits_[j]);
     longest_s = std::max(longest_s, next_brakes_[j].duration_s());
@@ -319,7 +343,26 @@ bool TeleoperationMotion::KeepsClear(const Motions& next,
   // At the clearance itself nothing could be proved, not even the way out.
   if (now_m >= options_.clearance_m + 2 * kRounding_m) return false;
   nearest_m_ = std::max(nearest_m_, std::min(now_m, options_.clearance_m));
-  return checker_->KeepsClear(path, 0, end, nearest_m_ - kRounding_m, touches_);
+  if (checker_->KeepsClear(path, 0, end, nearest_m_ - kRounding_m, touches_)) return true;
+  // Who has come that much nearer could not prove even the way out. It is free where command and
+  // rest behind it are no nearer than now.
+  for (const double s : {1.0, end}) {
+    path.Position(s, full_);
+    if (checker_->SmallestDistance(full_, touches_) < now_m) return false;
+  }
+  return checker_->KeepsClear(path, 0, end, now_m - 2 * kRounding_m, touches_);
+}
+
+bool TeleoperationMotion::LeadsOut(const Aim& aim) {
+  const std::vector<int>& indices = robot_.chain.joint_indices();
+  for (std::size_t j = 0; j < dof_; ++j) full_[indices[j]] = at_[j].position;
+  const double cost =
+      checker_->NearnessCost(full_, options_.clearance_m + kSlideWithin_m, touches_, &gradient_);
+  double along = 0;
+  for (std::size_t j = 0; j < dof_; ++j) {
+    along += gradient_[indices[j]] * (aim.position[j] - at_[j].position);
+  }
+  return cost > 0 && along < 0;
 }
 
 bool TeleoperationMotion::Slide(Aim& aim) {

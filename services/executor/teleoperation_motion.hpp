@@ -115,11 +115,14 @@ class TeleoperationMotion {
   void MeasureBehind();
   Aim AimAt(Duration now) const;
   void Pursue(const StepInput& input);
-  /// Goes on to what Follow makes of `aim`, if that is proved.
-  bool Try(const Aim& aim, const StepInput& input);
+  /// Goes on to what Follow makes of `aim`, if that is proved. `together`: the joints' limits in
+  /// the ratio of their ways, so that from rest they go straight.
+  bool Try(const Aim& aim, const StepInput& input, bool together = false);
   bool KeepsLimits(const Motions& next, const std::array<Brake, kMaxJoints>& brakes) const;
   bool KeepsClear(const Motions& next, const std::array<Brake, kMaxJoints>& brakes,
                   double longest_brake_s);
+  /// Whether the straight way to the aim leads away from what is near.
+  bool LeadsOut(const Aim& aim);
   /// Turns the aim along what is near, where there is anything.
   bool Slide(Aim& aim);
   void Coast(double elapsed_s);
@@ -145,6 +148,7 @@ class TeleoperationMotion {
   double longest_brake_s_ = 0;
   double nearest_m_;  ///< that the robot has been allowed to come, less than asked
   double share_ = 1;  ///< of the speed, near to what is in the way
+  bool out_ = false;  ///< on a straight way out of what is near
   double blocked_s_ = 0;
   double free_s_ = 0;
 

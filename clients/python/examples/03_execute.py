@@ -1,6 +1,6 @@
 """Carries a skill out on the robot of the station: plans, moves, and says how it went.
 
-Usage: python 03_execute.py press --object target=0.55,-0.15,0.06 [--executor HOST:PORT] [--speed 0.5]
+Usage: python 03_execute.py press --object target=0.55,-0.15,0.05 [--executor HOST:PORT] [--speed 0.5]
 """
 
 import argparse

@@ -21,7 +21,7 @@ SCENE = ROOT / "deploy" / "config" / "rail_press.yaml"
 DOMAIN = 97
 BUTTONS = [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06), (0.66, -0.22, 0.06), (0.52, -0.02, 0.06)]
 # Where the scene has its button, which no trial had.
-BUTTON = (0.55, -0.15, 0.06)
+BUTTON = (0.55, -0.15, 0.05)
 
 
 class Station:

@@ -456,10 +456,11 @@ TEST_F(StepTest, StopsAtTheClearanceAndComesBackOutWhenTheOperatorDrawsBack) {
   Follow();
   // Down into the table, as quickly as the suit may.
   double smallest = 1;
-  operator_velocity_[1] = 1.0;
+  const double speed = 1.0;
+  operator_velocity_[1] = speed;
   const double begin = operator_[1];
   for (int i = 0; i < 190; ++i) {
-    operator_[1] = begin + operator_velocity_[1] * kStep_s * std::min(i, 140);
+    operator_[1] = begin + speed * kStep_s * std::min(i, 140);
     if (i == 140) operator_velocity_.setZero();
     Step();
     smallest = std::min(smallest, Clearance());

@@ -9,6 +9,8 @@ namespace exemplar::learning {
 namespace {
 
 constexpr int kBlocks = 6;
+/// What stands still may move by this part of the motion's extent.
+constexpr double kPartOfExtent = 0.005;
 
 // Medians of each column over `kBlocks` stretches of the samples, and the deviation that noise
 // gives them.
@@ -53,11 +55,40 @@ Eigen::RowVectorXd ColumnMedians(const Eigen::MatrixXd& samples) {
   return medians;
 }
 
+/// Whether the positions go one way by more than noise and `most_m` explain. In a few samples a
+/// steady motion looks like noise to differences; to what a straight line leaves over it does not.
+bool Drifts(const demonstration::PoseSeries& series, double most_m) {
+  constexpr double kDeviations = 4;
+  const auto n = static_cast<double>(series.size());
+  double mean_time = 0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    mean_time += series.time_s[k] / n;
+    mean += series.base_T_frame[k].translation / n;
+  }
+  double spread = 0;
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    const double t = series.time_s[k] - mean_time;
+    spread += t * t;
+    slope += t * (series.base_T_frame[k].translation - mean);
+  }
+  if (spread <= 0) return false;
+  slope /= spread;
+  double rest = 0;
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    const double t = series.time_s[k] - mean_time;
+    rest += (series.base_T_frame[k].translation - mean - t * slope).squaredNorm();
+  }
+  const double duration_s = series.time_s.back() - series.time_s.front();
+  const double deviation = std::sqrt(rest / std::max(1.0, n - 2) / spread) * duration_s;
+  return slope.norm() * duration_s > std::max(most_m, kDeviations * deviation);
+}
+
 }  // namespace
 
 std::optional<geometry::Pose> StaticPose(const demonstration::PoseSeries& series, double extent_m) {
   constexpr double kNoiseDeviations = 6;
-  constexpr double kPartOfExtent = 0.005;
   constexpr double kLeastTurn_rad = 0.02;
   const auto n = static_cast<Eigen::Index>(series.size());
   Eigen::MatrixXd positions(n, 3);
@@ -104,8 +135,13 @@ std::optional<geometry::Pose> TakenFrom(const demonstration::PoseSeries& series,
   if (head < kLeastSamples || time.size() - tail < kLeastSamples || head > tail) {
     return std::nullopt;
   }
-  if (!StaticPose(part(tail, time.size()), extent_m)) return std::nullopt;
-  return StaticPose(part(0, head), extent_m);
+  const demonstration::PoseSeries before = part(0, head);
+  const demonstration::PoseSeries after = part(tail, time.size());
+  if (Drifts(before, kPartOfExtent * extent_m) || Drifts(after, kPartOfExtent * extent_m) ||
+      !StaticPose(after, extent_m)) {
+    return std::nullopt;
+  }
+  return StaticPose(before, extent_m);
 }
 
 }  // namespace exemplar::learning
