@@ -197,13 +197,13 @@ class TeleoperationTest(unittest.TestCase):
         wall = self.folder / "wall.yaml"
         tool = self.tool_at_home()
         text = TABLE.read_text()
-        entry = f"  - {{name: wall, shape: box, size: [0.4, 0.02, 0.4], position: [{tool[0]:.3f}, {tool[1] - 0.09:.3f}, {tool[2]:.3f}], quaternion: [0, 0, 0, 1]}}\n"
+        entry = f"  - {{name: wall, shape: box, size: [0.4, 0.02, 0.4], position: [{tool[0]:.3f}, {tool[1] - 0.13:.3f}, {tool[2]:.3f}], quaternion: [0, 0, 0, 1]}}\n"
         wall.write_text(re.sub(r"^obstacles:\n", "obstacles:\n" + entry, text, count=1, flags=re.M))
         self.start_robot(wall)
         on = self.teleop_on()
         ease = lambda t: 0.5 - 0.5 * math.cos(2 * math.pi * min(t, 6) / 6)
         sway = lambda t: {"torso_rotation": -0.6 * ease(t)}
-        capture = self.capture(self.trial("sway", sway, 7))
+        capture = self.capture(self.trial("sway", sway, 10))
         self.wait_said("blocked: ")
         self.assertIn('"wall"', self.said.read_text())
         self.assertEqual(capture.wait(60), 0, self.programs.logs())

@@ -214,6 +214,7 @@ TEST_F(HeldUpWatchTest, TakesJointStatesThoughTheChecksOfTheLastOnesTakeLong) {
   Begin(Press());
   Steps(20);
   Hold(true);
+  awaits_checks_ = false;
   Step();
   {
     std::unique_lock lock(gate_mutex_);

@@ -65,7 +65,13 @@ class RobotRig : public ::testing::Test {
     button.radius_m = 0.03;
     button.height_m = 0.1;
     scene_.buttons.push_back(button);
-    executor_ = *Executor::Create(bus_, clock_, log_, skills_, robot_, scene_, options);
+    ExecutorOptions told = options;
+    told.on_taken = [this, also = options.on_taken] {
+      if (also) also();
+      { const std::lock_guard lock(mutex_); }
+      heard_.notify_all();
+    };
+    executor_ = *Executor::Create(bus_, clock_, log_, skills_, robot_, scene_, told);
     state_writer_ = *bus_.MakeWriter<ircp::JointStateSample>("robot");
     object_writer_ = *bus_.MakeWriter<ircp::ObjectSample>("vision");
     safety_writer_ = *bus_.MakeWriter<ircp::SafetySample>("panel");
@@ -83,6 +89,8 @@ class RobotRig : public ::testing::Test {
         });
     PublishState();
   }
+
+  ~RobotRig() override { executor_.reset(); }
 
   void PublishState() {
     ircp::JointStateSample sample;
@@ -150,7 +158,10 @@ class RobotRig : public ::testing::Test {
         measured_[0] += 1e-7;  // no sensor stands quite still
       }
     }
-    if (speaks_) PublishState();
+    if (!speaks_) return;
+    PublishState();
+    // A busy machine must not let the checks fall behind: in the world there are 8 ms for them.
+    if (awaits_checks_) Await([this] { return over_ || executor_->HasTaken({}); });
   }
 
   void Steps(int count) {
@@ -203,6 +214,7 @@ class RobotRig : public ::testing::Test {
   Duration state_delay_{0};
   std::optional<std::uint64_t> command_lag_;  ///< in commands; absent: the robot does not say
   bool speaks_ = true;
+  bool awaits_checks_ = true;  ///< of a state, before the next step
 
   std::mutex mutex_;
   std::condition_variable heard_;
