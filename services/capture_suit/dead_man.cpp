@@ -7,6 +7,10 @@ namespace {
 
 constexpr const char* kSource = "suit-dead-man";
 constexpr Duration kPeriod = std::chrono::milliseconds(50);
+constexpr Duration kReleasedFor = std::chrono::milliseconds(500);
+/// Without an answer to a press for so long it is pressed anew: whoever had to hear it may not have
+/// been there yet.
+constexpr Duration kPressedFor = std::chrono::milliseconds(2000);
 
 }  // namespace
 
@@ -21,8 +25,9 @@ Result<std::unique_ptr<DeadMan>> DeadMan::Create(ircp::Bus& bus, const Clock& cl
   auto reader = bus.MakeReaderOn<ircp::StatusSample>(
       ircp::StatusTopic("executor"),
       [dead_man](const ircp::StatusSample& status, const ircp::Reception&) {
-        dead_man->followed_.store(status.state == "teleoperating" &&
-                                  status.detail.starts_with("following"));
+        const bool on = status.state == "teleoperating";
+        dead_man->followed_.store(on && status.detail.starts_with("following"));
+        if (on && !status.detail.starts_with("holding")) dead_man->answered_.store(true);
       });
   if (!reader.ok()) return reader.error();
   made->executor_ = *std::move(reader);
@@ -34,6 +39,20 @@ DeadMan::~DeadMan() {
   thread_.request_stop();
   if (thread_.joinable()) thread_.join();
   Set(false);
+}
+
+void DeadMan::BeginToPress() {
+  Set(false);
+  answered_.store(false);
+  turn_at_ = clock_.Steady() + kReleasedFor;
+}
+
+void DeadMan::GoOnPressing() {
+  const Duration now = clock_.Steady();
+  if (now < turn_at_ || (held_.load() && answered_.load())) return;
+  const bool press = !held_.load();
+  Set(press);
+  turn_at_ = now + (press ? kPressedFor : kReleasedFor);
 }
 
 void DeadMan::Set(bool held) {

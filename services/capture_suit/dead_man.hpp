@@ -19,7 +19,10 @@ class DeadMan {
   static Result<std::unique_ptr<DeadMan>> Create(ircp::Bus& bus, const Clock& clock);
   ~DeadMan();
 
-  void Press() { Set(true); }
+  /// Releases; then GoOnPressing, called again and again on the same thread, presses after half a
+  /// second, and anew until a robot answers. What has answered once is never pressed anew.
+  void BeginToPress();
+  void GoOnPressing();
   void Release() { Set(false); }
   /// Whether the executor says that the robot follows.
   bool followed() const { return followed_.load(); }
@@ -34,6 +37,8 @@ class DeadMan {
   std::unique_ptr<ircp::Writer<ircp::SafetySample>> writer_;
   std::atomic<bool> held_{false};
   std::atomic<bool> followed_{false};
+  std::atomic<bool> answered_{false};  ///< the robot followed, or came to it, since BeginToPress
+  Duration turn_at_{0};                ///< of the press or release that comes next
   std::unique_ptr<ircp::Reader> executor_;
   std::jthread thread_;
 };

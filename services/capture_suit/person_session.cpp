@@ -223,11 +223,10 @@ Status PersonSession::BeFollowed(const std::stop_token& stop) {
   if (!dead_man_) return {};
   return WhileStill(
       [&]() -> Status {
-        dead_man_->Release();
-        if (!clock_.SleepFor(kReleasedFor, stop)) return Cancelled();
-        dead_man_->Press();
+        dead_man_->BeginToPress();
         const Duration deadline = clock_.Steady() + kFollowTimeout;
         while (!dead_man_->followed() && clock_.Steady() < deadline) {
+          dead_man_->GoOnPressing();
           if (!clock_.SleepFor(kPollInterval, stop)) return Cancelled();
         }
         if (!dead_man_->followed()) log_.Warning("no robot follows the suit");

@@ -121,15 +121,10 @@ Status ReplaySession::BeFollowed(const demonstration::Trial& trial, const std::s
     log_.Warning("the trial has no joints of a suit that a robot could follow");
     return {};
   }
-  dead_man_->Release();
-  const Duration press = clock_.Steady() + kReleasedFor;
-  const Duration deadline = press + kFollowTimeout;
-  bool pressed = false;
+  dead_man_->BeginToPress();
+  const Duration deadline = clock_.Steady() + kFollowTimeout;
   while (!dead_man_->followed() && clock_.Steady() < deadline) {
-    if (!pressed && clock_.Steady() >= press) {
-      dead_man_->Press();
-      pressed = true;
-    }
+    dead_man_->GoOnPressing();
     ircp::SuitSample still = *first;
     still.header.stamp = clock_.Now();
     if (Status sent = streams_.Send(still); !sent) return sent;

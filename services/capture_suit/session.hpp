@@ -15,8 +15,6 @@ inline constexpr Duration kAcknowledgeTimeout = std::chrono::seconds(45);
 
 /// A robot that is to follow has so long to come to where the trial begins.
 inline constexpr Duration kFollowTimeout = std::chrono::seconds(20);
-/// A switch is seen released for so long before it is pressed.
-inline constexpr Duration kReleasedFor = std::chrono::milliseconds(200);
 /// A robot has so long to come to rest at the end of a trial before the switch is released.
 inline constexpr Duration kHeldAfter = std::chrono::milliseconds(300);
 
