@@ -59,6 +59,10 @@ class DdsWriter final : public ByteWriter {
 
   ~DdsWriter() override {
     if (reliable_) WaitForAcknowledgments(kLastWordsTimeout);
+    // Fast DDS 2.9 releases the samples of a writer that goes one by one beside its heartbeats; one
+    // that meets them half released looks for gaps without end, and holds the writer's lock.
+    std::size_t removed = 0;
+    writer_.clear_history(&removed);
     publisher_.delete_datawriter(&writer_);
   }
 
