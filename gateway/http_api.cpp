@@ -42,7 +42,7 @@ Result<api::JsonCall> CallOf(const HttpApi& api, const std::string& method,
   call.stop = request.gone;
   if (const std::string* text = request.headers.Find("Connect-Timeout-Ms")) {
     const std::optional<long long> timeout_ms = ParseInteger(*text);
-    constexpr long long kMost = 24 * 3600 * 1000LL;
+    constexpr long long kMost = 24LL * 3600 * 1000;
     if (!timeout_ms || *timeout_ms < 1 || *timeout_ms > kMost) {
       return InvalidArgument("Connect-Timeout-Ms is \"" + *text +
                                  "\", must be a whole number from 1 to " + std::to_string(kMost),

@@ -28,7 +28,7 @@ class HttpSide {
   void Stop() { server_->Stop(); }
 
  private:
-  const SystemClock clock_;
+  const SystemClock clock_{};
   std::string port_file_;
   rpc::Server* grpc_ = nullptr;
   std::unique_ptr<api::JsonCalls> calls_;
