@@ -180,10 +180,14 @@ class ComposeTest(unittest.TestCase):
         return {name: figures["lost"] for name, figures in topics.items() if figures["lost"] and name not in LOSSY}
 
     def setUp(self):
+        # A test before may have left some of it down.
+        self.station.compose("up", "-d", *LONG_RUNNING)
+        wait_for(lambda: self.station.healthy(*LONG_RUNNING), "healthy containers", 90)
         self.before = self.acknowledged()
 
     def tearDown(self):
-        if not self._outcome.success:
+        result = self._outcome.result
+        if any(getattr(case, "test_case", case) is self for case, _ in [*result.failures, *result.errors]):
             self.show_logs()
         with contextlib.suppress(AssertionError):
             self.recorder("stop")
