@@ -14,6 +14,26 @@
 #include "screen.hpp"
 
 namespace exemplar::cli {
+namespace {
+
+/// What can be done about it; empty where the error says so itself.
+std::string_view RemedyOf(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::kUnauthenticated:
+      return error.field == "certificate"
+                 ? "whoever keeps the station's files makes a certificate that has access:\n"
+                   "  exemplar security issue FOLDER NAME --role person --call ROLE"
+                 : "give a token with --token @FILE or EXEMPLAR_TOKEN; whoever keeps the station's "
+                   "files makes one:\n  exemplar security token FOLDER NAME --role ROLE";
+    case ErrorCode::kPermissionDenied:
+      return "whoever keeps the station's files makes a token that has the role:\n"
+             "  exemplar security token FOLDER NAME --role ROLE";
+    default:
+      return {};
+  }
+}
+
+}  // namespace
 
 Result<rpc::ClientOptions> Session::Options() const {
   rpc::ClientOptions options;
@@ -38,7 +58,11 @@ Result<rpc::Clients> Session::Connect() const {
 }
 
 int Fail(const Error& error) {
-  return program::Fail(Paint("exemplar", Colour::kRed, STDERR_FILENO), error);
+  const int code = program::Fail(Paint("exemplar", Colour::kRed, STDERR_FILENO), error);
+  if (const std::string_view remedy = RemedyOf(error); !remedy.empty()) {
+    std::cerr << "  " << remedy << '\n';
+  }
+  return code;
 }
 
 int FailUsage(const Error& error) {

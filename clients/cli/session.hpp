@@ -27,7 +27,8 @@ struct Session {
   Result<rpc::Clients> Connect() const;
 };
 
-/// Says "exemplar: what is wrong" on stderr; returns the contract's exit code.
+/// Says "exemplar: what is wrong" on stderr, and what helps where that is known; returns the
+/// contract's exit code.
 int Fail(const Error& error);
 /// The same for words of the command line that cannot be meant.
 int FailUsage(const Error& error);

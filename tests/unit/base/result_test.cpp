@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <set>
 
 namespace exemplar {
 namespace {
@@ -30,6 +31,16 @@ TEST(ResultTest, PlaceComesBeforeTheMessage) {
   const Error error = WithPlace(WithPlace(InvalidArgument("is odd"), "line 3"), "a.csv");
   EXPECT_EQ(error.message, "a.csv: line 3: is odd");
   EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
+}
+
+TEST(ErrorCodeTest, IsFoundAgainByItsName) {
+  std::set<std::string_view> names;
+  for (const ErrorCode code : kErrorCodes) {
+    EXPECT_EQ(ParseErrorCode(ToString(code)), code);
+    names.insert(ToString(code));
+  }
+  EXPECT_EQ(names.size(), kErrorCodes.size());
+  EXPECT_EQ(ParseErrorCode("none_of_them"), std::nullopt);
 }
 
 TEST(ResultTest, StatusIsGoodUnlessToldOtherwise) {

@@ -24,8 +24,21 @@ std::string_view ToString(ErrorCode code) {
       return "data_loss";
     case ErrorCode::kInternal:
       return "internal";
+    case ErrorCode::kUnauthenticated:
+      return "unauthenticated";
+    case ErrorCode::kPermissionDenied:
+      return "permission_denied";
+    case ErrorCode::kUnimplemented:
+      return "unimplemented";
   }
   return "internal";
+}
+
+std::optional<ErrorCode> ParseErrorCode(std::string_view name) {
+  for (const ErrorCode code : kErrorCodes) {
+    if (ToString(code) == name) return code;
+  }
+  return std::nullopt;
 }
 
 Error WithPlace(Error error, std::string_view place) {

@@ -229,6 +229,12 @@ int StatusOf(ErrorCode code) {
       return 504;
     case ErrorCode::kCancelled:
       return 499;
+    case ErrorCode::kUnauthenticated:
+      return 401;
+    case ErrorCode::kPermissionDenied:
+      return 403;
+    case ErrorCode::kUnimplemented:
+      return 501;
     case ErrorCode::kDataLoss:
     case ErrorCode::kInternal:
       break;

@@ -27,6 +27,12 @@ grpc::StatusCode CodeOf(ErrorCode code) {
       return grpc::StatusCode::DATA_LOSS;
     case ErrorCode::kInternal:
       return grpc::StatusCode::INTERNAL;
+    case ErrorCode::kUnauthenticated:
+      return grpc::StatusCode::UNAUTHENTICATED;
+    case ErrorCode::kPermissionDenied:
+      return grpc::StatusCode::PERMISSION_DENIED;
+    case ErrorCode::kUnimplemented:
+      return grpc::StatusCode::UNIMPLEMENTED;
   }
   return grpc::StatusCode::INTERNAL;
 }
@@ -49,48 +55,64 @@ std::string HintOf(const std::string& message) {
   return {};
 }
 
-/// What an error without our detail means: it came from gRPC itself or a server that is not ours.
-Error WithoutDetail(const grpc::Status& status, const std::string& address) {
-  switch (status.error_code()) {
-    case grpc::StatusCode::UNAVAILABLE:
-      return Unavailable("no answer from " + address + ": " + status.error_message() +
-                         HintOf(status.error_message()));
-    case grpc::StatusCode::DEADLINE_EXCEEDED:
-      return {ErrorCode::kDeadlineExceeded, address + " did not answer in time"};
-    case grpc::StatusCode::CANCELLED:
-      return {ErrorCode::kCancelled, "the call to " + address + " was cancelled"};
-    case grpc::StatusCode::UNIMPLEMENTED:
-      return FailedPrecondition(address + " does not serve this call: " + status.error_message());
-    case grpc::StatusCode::RESOURCE_EXHAUSTED:
-      return {ErrorCode::kResourceExhausted, address + ": " + status.error_message()};
+ErrorCode CodeOf(grpc::StatusCode code) {
+  switch (code) {
     case grpc::StatusCode::INVALID_ARGUMENT:
     case grpc::StatusCode::OUT_OF_RANGE:
-      return InvalidArgument(address + ": " + status.error_message());
+      return ErrorCode::kInvalidArgument;
     case grpc::StatusCode::NOT_FOUND:
-      return NotFound(address + ": " + status.error_message());
+      return ErrorCode::kNotFound;
     case grpc::StatusCode::ALREADY_EXISTS:
-      return {ErrorCode::kAlreadyExists, address + ": " + status.error_message()};
+      return ErrorCode::kAlreadyExists;
     case grpc::StatusCode::FAILED_PRECONDITION:
     case grpc::StatusCode::ABORTED:
-    case grpc::StatusCode::PERMISSION_DENIED:
-    case grpc::StatusCode::UNAUTHENTICATED:
-      return FailedPrecondition(address + ": " + status.error_message());
+      return ErrorCode::kFailedPrecondition;
+    case grpc::StatusCode::UNAVAILABLE:
+      return ErrorCode::kUnavailable;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return ErrorCode::kResourceExhausted;
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+      return ErrorCode::kDeadlineExceeded;
+    case grpc::StatusCode::CANCELLED:
+      return ErrorCode::kCancelled;
     case grpc::StatusCode::DATA_LOSS:
-      return {ErrorCode::kDataLoss, address + ": " + status.error_message()};
+      return ErrorCode::kDataLoss;
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return ErrorCode::kUnauthenticated;
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return ErrorCode::kPermissionDenied;
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return ErrorCode::kUnimplemented;
     default:
-      return Internal(address + ": " + status.error_message());
+      return ErrorCode::kInternal;
+  }
+}
+
+/// What is said of an error without our detail: it came from gRPC itself or a server that is not
+/// ours.
+std::string MessageOf(const grpc::Status& status, const std::string& address) {
+  const std::string& said = status.error_message();
+  switch (status.error_code()) {
+    case grpc::StatusCode::UNAVAILABLE:
+      return "no answer from " + address + ": " + said + HintOf(said);
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+      return address + " did not answer in time";
+    case grpc::StatusCode::CANCELLED:
+      return "the call to " + address + " was cancelled";
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return address + " does not serve this call: " + said;
+    default:
+      return address + ": " + said;
   }
 }
 
 }  // namespace
 
 grpc::Status ToGrpc(const Status& status) {
-  return status ? grpc::Status::OK : ToGrpc(status.error(), CodeOf(status.error().code));
-}
-
-grpc::Status ToGrpc(const Error& error, grpc::StatusCode code) {
+  if (status) return grpc::Status::OK;
+  const grpc::StatusCode code = CodeOf(status.error().code);
   v1::ErrorDetail detail;
-  ToProto(error, &detail);
+  ToProto(status.error(), &detail);
   v1::CallStatus all;
   all.set_code(code);
   all.set_message(detail.message());
@@ -103,10 +125,13 @@ Error FromGrpc(const grpc::Status& status, const std::string& address) {
   if (!status.error_details().empty() && all.ParseFromString(status.error_details())) {
     for (const google::protobuf::Any& any : all.details()) {
       v1::ErrorDetail detail;
-      if (any.UnpackTo(&detail)) return FromProto(detail);
+      if (!any.UnpackTo(&detail)) continue;
+      Error error = FromProto(detail);
+      if (!ParseErrorCode(detail.code())) error.code = CodeOf(status.error_code());
+      return error;
     }
   }
-  return WithoutDetail(status, address);
+  return {CodeOf(status.error_code()), MessageOf(status, address)};
 }
 
 }  // namespace exemplar::rpc

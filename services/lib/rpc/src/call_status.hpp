@@ -9,9 +9,8 @@ namespace exemplar::rpc {
 
 /// The standard code and message, with an ErrorDetail that names the field.
 grpc::Status ToGrpc(const Status& status);
-/// The same for an error that gRPC has a code of its own for.
-grpc::Status ToGrpc(const Error& error, grpc::StatusCode code);
-/// The Error that the server had, or what the transport says. Precondition: !status.ok().
+/// The Error that the server had, or what the transport says. Where the server is of another version
+/// and its code has a name that is not known here, gRPC's code counts. Precondition: !status.ok().
 Error FromGrpc(const grpc::Status& status, const std::string& address);
 
 }  // namespace exemplar::rpc

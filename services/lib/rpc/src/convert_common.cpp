@@ -285,16 +285,8 @@ void ToProto(const Error& error, v1::ErrorDetail* message) {
 }
 
 Error FromProto(const v1::ErrorDetail& message) {
-  constexpr std::array kCodes = {ErrorCode::kInvalidArgument,  ErrorCode::kNotFound,
-                                 ErrorCode::kAlreadyExists,    ErrorCode::kFailedPrecondition,
-                                 ErrorCode::kUnavailable,      ErrorCode::kResourceExhausted,
-                                 ErrorCode::kDeadlineExceeded, ErrorCode::kCancelled,
-                                 ErrorCode::kDataLoss,         ErrorCode::kInternal};
-  Error error{ErrorCode::kInternal, message.message(), message.field()};
-  for (const ErrorCode code : kCodes) {
-    if (ToString(code) == message.code()) error.code = code;
-  }
-  return error;
+  return {ParseErrorCode(message.code()).value_or(ErrorCode::kInternal), message.message(),
+          message.field()};
 }
 
 }  // namespace exemplar::rpc

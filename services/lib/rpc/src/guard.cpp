@@ -44,8 +44,10 @@ bool IsLocalPeer(const std::string& peer) {
          peer.starts_with("ipv6:%5B::1%5D") || peer.starts_with("ipv6:[::1]");
 }
 
+Refusal Refused(const Error& error) { return {ToString(error.code), error}; }
+
 Refusal TooOften(const std::string& who) {
-  return {grpc::StatusCode::RESOURCE_EXHAUSTED, "rate_limited",
+  return {"rate_limited",
           Error{ErrorCode::kResourceExhausted, who + " calls too often; wait and try again"}};
 }
 
@@ -81,28 +83,24 @@ Result<security::Caller> Guard::Identify(const grpc::ServerContextBase& context)
 Admission Guard::Admit(const grpc::ServerContextBase& context, std::string_view method,
                        const MethodRule* rule) {
   if (rule == nullptr) {
-    return {{},
-            Refusal{grpc::StatusCode::PERMISSION_DENIED, "permission_denied",
-                    FailedPrecondition(std::string(method) + " has no rule who may call it")}};
+    return {{}, Refused(PermissionDenied(std::string(method) + " has no rule who may call it"))};
   }
   const std::string peer = context.peer();
   const Result<security::Caller> caller = Identify(context);
   if (!caller) {
     if (!limiter_.Allow("unknown " + HostOfPeer(peer))) return {{}, TooOften(HostOfPeer(peer))};
-    return {{}, Refusal{grpc::StatusCode::UNAUTHENTICATED, "unauthenticated", caller.error()}};
+    return {{}, Refused(caller.error())};
   }
   if (access_ || !IsLocalPeer(peer)) {
     const std::string& who = caller->name.empty() ? HostOfPeer(peer) : caller->name;
     if (!limiter_.Allow(who)) return {caller->name, TooOften(who)};
   }
   if (!caller->roles.Has(rule->role)) {
-    return {caller->name,
-            Refusal{grpc::StatusCode::PERMISSION_DENIED, "permission_denied",
-                    FailedPrecondition(caller->name + " may not call " + std::string(method) +
-                                           ": that takes the role " +
-                                           std::string(ToString(rule->role)) + ", and " +
-                                           caller->name + " has " + ToText(caller->roles),
-                                       "role")}};
+    return {caller->name, Refused(PermissionDenied(
+                              caller->name + " may not call " + std::string(method) +
+                                  ": that takes the role " + std::string(ToString(rule->role)) +
+                                  ", and " + caller->name + " has " + ToText(caller->roles),
+                              "role"))};
   }
   return {caller->name, std::nullopt};
 }

@@ -23,7 +23,6 @@ namespace exemplar::rpc {
 
 /// Why a call is not let in.
 struct Refusal {
-  grpc::StatusCode code = grpc::StatusCode::INTERNAL;
   std::string_view outcome;  ///< as CallRecord has it
   Error error;
 };

@@ -58,15 +58,10 @@ int HttpStatusOf(StatusCode code) {
 
 api::JsonFailure FailureOf(const grpc::Status& status) {
   const Error error = FromGrpc(status, "the gateway");
-  api::JsonFailure failure{.http_status = HttpStatusOf(status.error_code()),
-                           .code = std::string(ToString(error.code)),
-                           .message = error.message,
-                           .field = error.field};
-  // Finer than our own codes.
-  if (status.error_code() == StatusCode::UNAUTHENTICATED) failure.code = "unauthenticated";
-  if (status.error_code() == StatusCode::PERMISSION_DENIED) failure.code = "permission_denied";
-  if (status.error_code() == StatusCode::UNIMPLEMENTED) failure.code = "unimplemented";
-  return failure;
+  return {.http_status = HttpStatusOf(status.error_code()),
+          .code = std::string(ToString(error.code)),
+          .message = error.message,
+          .field = error.field};
 }
 
 grpc::ByteBuffer ToBuffer(const Message& message) {

@@ -208,7 +208,7 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Proxy::Relay(
   mark.SetCaller(admission.caller);
   if (admission.refusal) {
     mark.End(admission.refusal->error, admission.refusal->outcome);
-    return RefuseCall(ToGrpc(admission.refusal->error, admission.refusal->code));
+    return RefuseCall(ToGrpc(admission.refusal->error));
   }
   if (calls_.fetch_add(1) >= kMostCalls) {
     --calls_;

@@ -66,7 +66,7 @@ grpc::Status Serve(ServerShared& shared, grpc::ServerContext& context, std::stri
   };
   if (admission.refusal) {
     report(admission.refusal->error, admission.refusal->outcome);
-    return ToGrpc(admission.refusal->error, admission.refusal->code);
+    return ToGrpc(admission.refusal->error);
   }
   Status status;
   {

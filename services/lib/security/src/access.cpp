@@ -250,24 +250,24 @@ Result<Caller> Identify(const AccessList& list, const Presented& who, Stamp now)
   const AccessEntry* entry = nullptr;
   if (!who.token.empty()) {
     entry = FindToken(list, who.token);
-    if (entry == nullptr) return FailedPrecondition("the token is not known here", "token");
-    if (IsOver(*entry, now)) return FailedPrecondition("the token has expired", "token");
+    if (entry == nullptr) return Unauthenticated("the token is not known here", "token");
+    if (IsOver(*entry, now)) return Unauthenticated("the token has expired", "token");
   } else if (!who.certificate_name.empty()) {
     entry = FindCertificate(list, who);
     if (entry == nullptr) {
-      return FailedPrecondition(
+      return Unauthenticated(
           "the certificate of " + std::string(who.certificate_name) + " has no access here",
           "certificate");
     }
     if (IsOver(*entry, now)) {
-      return FailedPrecondition("the access of " + entry->name + " has expired", "certificate");
+      return Unauthenticated("the access of " + entry->name + " has expired", "certificate");
     }
   } else {
-    return FailedPrecondition("this server wants a token (--token) or a certificate", "token");
+    return Unauthenticated("this server wants a token (--token) or a certificate", "token");
   }
   if (who.for_whom.empty()) return Caller{entry->name, entry->roles};
   if (!entry->speaks_for_others) {
-    return FailedPrecondition(entry->name + " may not speak for others", "caller");
+    return PermissionDenied(entry->name + " may not speak for others", "caller");
   }
   RoleSet roles;
   bool known = false;
@@ -278,7 +278,9 @@ Result<Caller> Identify(const AccessList& list, const Presented& who, Stamp now)
       known = true;
     }
   }
-  if (!known) return FailedPrecondition("he whom " + entry->name + " speaks for is unknown here");
+  if (!known) {
+    return Unauthenticated("he whom " + entry->name + " speaks for is unknown here", "caller");
+  }
   return Caller{std::string(who.for_whom) + " via " + entry->name, roles};
 }
 

@@ -37,8 +37,7 @@ struct JsonCall {
 /// Why a call failed, as HTTP says it.
 struct JsonFailure {
   int http_status = 500;
-  std::string code = {};  ///< "invalid_argument", ...; also "unauthenticated", "permission_denied"
-                          ///< and "unimplemented"
+  std::string code = {};  ///< the name of the ErrorCode: "invalid_argument", ...
   std::string message = {};
   std::string field = {};
 };

@@ -1,6 +1,7 @@
 #pragma once
 // Expected failures as values. Broken contracts assert; only main() ends a process.
 
+#include <array>
 #include <cassert>
 #include <optional>
 #include <string>
@@ -22,10 +23,22 @@ enum class ErrorCode {
   kCancelled,           ///< The caller asked to stop.
   kDataLoss,            ///< Stored data is damaged.
   kInternal,            ///< A fault of ours.
+  kUnauthenticated,     ///< Who calls did not show who he is: no token, or one that is not known.
+  kPermissionDenied,    ///< Who calls is known, and may not do this.
+  kUnimplemented,       ///< Not served here: another service, or one of another version.
 };
+
+inline constexpr std::array kErrorCodes = {
+    ErrorCode::kInvalidArgument,    ErrorCode::kNotFound,        ErrorCode::kAlreadyExists,
+    ErrorCode::kFailedPrecondition, ErrorCode::kUnavailable,     ErrorCode::kResourceExhausted,
+    ErrorCode::kDeadlineExceeded,   ErrorCode::kCancelled,       ErrorCode::kDataLoss,
+    ErrorCode::kInternal,           ErrorCode::kUnauthenticated, ErrorCode::kPermissionDenied,
+    ErrorCode::kUnimplemented};
 
 /// The stable lower-case name of a code, as JSON output and logs print it ("not_found").
 std::string_view ToString(ErrorCode code);
+/// The code of a name, as ToString gives it.
+std::optional<ErrorCode> ParseErrorCode(std::string_view name);
 
 /// A failure: what was wrong, and where.
 struct Error {
@@ -53,6 +66,12 @@ inline Error FailedPrecondition(std::string message, std::string field = {}) {
 }
 inline Error Unavailable(std::string message) {
   return {ErrorCode::kUnavailable, std::move(message)};
+}
+inline Error Unauthenticated(std::string message, std::string field = {}) {
+  return {ErrorCode::kUnauthenticated, std::move(message), std::move(field)};
+}
+inline Error PermissionDenied(std::string message, std::string field = {}) {
+  return {ErrorCode::kPermissionDenied, std::move(message), std::move(field)};
 }
 inline Error Internal(std::string message) { return {ErrorCode::kInternal, std::move(message)}; }
 

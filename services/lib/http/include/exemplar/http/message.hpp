@@ -107,7 +107,7 @@ struct Response {
 Response Answer(std::string body, std::string content_type = "text/plain; charset=utf-8");
 /// {"code": "not_found", "message": ..., "field": ...} with the HTTP status of the error's code.
 Response ErrorAnswer(const Error& error);
-/// The HTTP status that says the same: 400, 404, 409, 412, 503, 429, 504, 499, 500.
+/// The HTTP status that says the same: 400, 401, 403, 404, 409, 412, 429, 499, 500, 501, 503, 504.
 int StatusOf(ErrorCode code);
 
 }  // namespace exemplar::http
