@@ -127,8 +127,8 @@ TEST(ExitCodeTest, FollowsTheContract) {
   EXPECT_EQ(ExitCode(ErrorCode::kNotFound), 3);
   EXPECT_EQ(ExitCode(ErrorCode::kFailedPrecondition), 4);
   EXPECT_EQ(ExitCode(ErrorCode::kUnavailable), 5);
-  EXPECT_EQ(ExitCode(ErrorCode::kUnauthenticated), 6);
-  EXPECT_EQ(ExitCode(ErrorCode::kPermissionDenied), 6);
+  EXPECT_EQ(ExitCode(ErrorCode::kUnauthenticated), 4);
+  EXPECT_EQ(ExitCode(ErrorCode::kPermissionDenied), 4);
   EXPECT_EQ(ExitCode(ErrorCode::kInternal), 1);
 }
 

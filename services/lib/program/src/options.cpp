@@ -119,8 +119,7 @@ struct Options::Impl {
   Impl(const std::string& name, std::string summary, const std::string& footer)
       : program(name), app(std::move(summary), name) {
     app.footer("Examples:\n" + footer +
-               "\n\nExit codes: 0 done, 2 usage, 3 not found, 4 refused, 5 unavailable, 6 not "
-               "allowed, 1 anything "
+               "\n\nExit codes: 0 done, 2 usage, 3 not found, 4 refused, 5 unavailable, 1 anything "
                "else.");
     app.get_formatter()->column_width(34);
     app.option_defaults()->always_capture_default();

@@ -145,13 +145,12 @@ int ExitCode(ErrorCode code) {
     case ErrorCode::kAlreadyExists:
     case ErrorCode::kDataLoss:
     case ErrorCode::kUnimplemented:
+    case ErrorCode::kUnauthenticated:
+    case ErrorCode::kPermissionDenied:
       return 4;
     case ErrorCode::kUnavailable:
     case ErrorCode::kDeadlineExceeded:
       return 5;
-    case ErrorCode::kUnauthenticated:
-    case ErrorCode::kPermissionDenied:
-      return 6;
     case ErrorCode::kResourceExhausted:
     case ErrorCode::kCancelled:
     case ErrorCode::kInternal:

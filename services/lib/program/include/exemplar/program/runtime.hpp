@@ -65,7 +65,7 @@ Status CheckHealth(const std::string& address,
 
 /// Prints "PROGRAM: message" to stderr and returns the exit code for the error.
 int Fail(const std::string& program, const Error& error);
-/// The contract's exit codes: 3 not found, 4 refused, 5 unavailable, 6 not allowed, 1 else.
+/// The contract's exit codes: 3 not found, 4 refused, 5 unavailable, 1 else.
 int ExitCode(ErrorCode code);
 
 const char* Version();
