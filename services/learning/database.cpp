@@ -78,7 +78,8 @@ Result<std::unique_ptr<Database>> Database::Open(const std::filesystem::path& fi
   sqlite3_extended_result_codes(connection, 1);
   if (const Status set = database->Execute(
           "PRAGMA busy_timeout = 5000; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
-          "PRAGMA foreign_keys = ON;");
+          // What is deleted is overwritten, so that nothing of it stays in the file's free pages.
+          "PRAGMA foreign_keys = ON; PRAGMA secure_delete = ON;");
       !set) {
     return set.error();
   }
@@ -99,6 +100,14 @@ Status Database::Execute(const std::string& sql) {
 }
 
 std::int64_t Database::changes() const { return sqlite3_changes64(connection_.get()); }
+
+Status Database::EmptyWal() {
+  Statement statement = Prepare("PRAGMA wal_checkpoint(TRUNCATE)");
+  const Result<bool> row = statement.Step();
+  if (!row) return row.error();
+  if (statement.Integer(0) == 0) return {};
+  return Unavailable(name_ + ": somebody reads it; its log cannot be emptied yet");
+}
 
 Error Database::Failure(int code) const {
   const std::string message = name_ + ": " + sqlite3_errmsg(connection_.get());

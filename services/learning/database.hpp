@@ -59,6 +59,9 @@ class Database {
   Status Execute(const std::string& sql);
   /// Rows that the last statement changed.
   std::int64_t changes() const;
+  /// Everything is in the main file, and the WAL is empty. kUnavailable while another connection
+  /// reads from it.
+  Status EmptyWal();
   Error Failure(int code) const;
 
  private:

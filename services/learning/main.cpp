@@ -6,6 +6,7 @@
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
 #include "exemplar/rpc/server.hpp"
+#include "learning/data.hpp"
 #include "learning/metrics.hpp"
 #include "learning/skills.hpp"
 #include "learning/store.hpp"
@@ -22,6 +23,17 @@ int main(int argc, char** argv) {
       {.server = true, .data = true});
   options.Add("--robot", robot_folder,
               "folder with robot.yaml and the URDF: for trials with joints but no poses");
+  learning_service::Retention retention;
+  constexpr double kLongest = 1e5;
+  options
+      .Add("--keep-trials-days", retention.keep_trials_days,
+           "trials go so many days after they came; 0: never")
+      .MinMax(0, kLongest)
+      .Add("--keep-versions-days", retention.keep_versions_days,
+           "former skill versions go so many days after they were learned; 0: never")
+      .MinMax(0, kLongest)
+      .Add("--expire-needed-trials", retention.needed_too,
+           "trials go as well where a current skill version was learned from them");
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
   const program::CommonOptions& common = options.common();
 
@@ -39,6 +51,7 @@ int main(int argc, char** argv) {
 
   learning_service::Trials trials(**store, clock, tool, bus::ReadTrialFromMcap);
   learning_service::Skills skills(**store, trials, clock, tool, *log);
+  learning_service::Data data(**store, skills, clock, *log, retention);
   rpc::CallLog calls(*log);
   const auto server =
       rpc::Server::Create({.listen = common.listen,
@@ -46,7 +59,7 @@ int main(int argc, char** argv) {
                            .credentials = common.server,
                            .log = log.get(),
                            .on_call = [&](const rpc::CallRecord& call) { calls.Record(call); }},
-                          {.trials = &trials, .skills = &skills});
+                          {.trials = &trials, .skills = &skills, .learning_data = &data});
   if (!server) return program::Fail(kName, server.error());
   const auto metrics = program::ServeMetrics(
       common,

@@ -1,16 +1,13 @@
 #include "learning/skills.hpp"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <future>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/learning/inspection.hpp"
+#include "learning/behind_others.hpp"
+#include "learning/skill_claim.hpp"
 
 namespace exemplar::learning_service {
 namespace {
@@ -26,21 +23,6 @@ std::string Place(const std::string& name, int version) {
 /// Older versions of skills that are kept in memory, of all skills together.
 constexpr std::size_t kOlderVersions = 16;
 
-/// Runs `work` on a thread that gives way to those that answer queries. What it throws is thrown
-/// here.
-template <class Work>
-auto RunBehindOthers(const Work& work) {
-  std::packaged_task<decltype(work())()> task([&work] {
-    // A niceness of this thread alone; where it is refused, it runs as the others do.
-    constexpr int kNiceness = 10;
-    static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness));
-    return work();
-  });
-  auto result = task.get_future();
-  std::thread(std::move(task)).join();
-  return result.get();
-}
-
 std::vector<std::string> TrialIds(const learning::SkillReport& report) {
   std::vector<std::string> ids;
   for (const auto& trial : report.trials) ids.push_back(trial.id);
@@ -48,31 +30,6 @@ std::vector<std::string> TrialIds(const learning::SkillReport& report) {
 }
 
 }  // namespace
-
-class Skills::Claim {
- public:
-  static Result<Claim> Take(Skills& skills, const std::string& name) {
-    const std::lock_guard lock(skills.claims_mutex_);
-    if (!skills.claims_.insert(name).second) {
-      return FailedPrecondition("skill \"" + name + "\" is being learned or changed already",
-                                "name");
-    }
-    return Claim(skills, name);
-  }
-  Claim(Claim&& other) noexcept
-      : skills_(std::exchange(other.skills_, nullptr)), name_(std::move(other.name_)) {}
-  Claim& operator=(Claim&&) = delete;
-  ~Claim() {
-    if (!skills_) return;
-    const std::lock_guard lock(skills_->claims_mutex_);
-    skills_->claims_.erase(name_);
-  }
-
- private:
-  Claim(Skills& skills, std::string name) : skills_(&skills), name_(std::move(name)) {}
-  Skills* skills_;
-  std::string name_;
-};
 
 Skills::Skills(Store& store, Trials& trials, const Clock& clock,
                std::shared_ptr<const demonstration::ToolKinematics> tool, Log& log)
@@ -82,10 +39,19 @@ Skills::Skills(Store& store, Trials& trials, const Clock& clock,
       tool_(std::move(tool)),
       log_(log),
       older_(kOlderVersions) {
+  Reload();
+}
+
+void Skills::Reload() {
   const Result<std::vector<api::SkillInfo>> all = store_.ListSkills();
   if (!all) {
     log_.Error("skills cannot be listed", {{"error", all.error().message}});
     return;
+  }
+  {
+    const std::unique_lock lock(current_mutex_);
+    for (const auto& [name, skill] : current_) older_.Forget(name);
+    current_.clear();
   }
   for (const api::SkillInfo& info : *all) {
     Result<learning::Skill> skill = FromStore(info.name, info.version);
@@ -203,8 +169,22 @@ Result<learning::SkillReport> Skills::LearnClaimed(const std::string& name,
   const Result<std::vector<learning::NamedTrial>> trials =
       LoadTrials(name, options, progress, stop);
   if (!trials) return trials.error();
+  const Result<Learned> learned = LearnFrom(name, *trials, options, progress, stop);
+  if (!learned) return learned.error();
+  // The last chance to turn back: from here on the version is there.
+  if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "learning was cancelled"};
+  if (const Status added = store_.AddVersion(learned->stored); !added) return added.error();
+  SetCurrent(name, learned->skill);
+  return learned->skill.report();
+}
+
+Result<Skills::Learned> Skills::LearnFrom(const std::string& name,
+                                          const std::vector<learning::NamedTrial>& trials,
+                                          const learning::LearnOptions& options,
+                                          const learning::Progress& progress,
+                                          const std::stop_token& stop) {
   const Result<learning::Skill> learned = learning::LearnSkill(
-      *trials, options, tool_,
+      trials, options, tool_,
       [&](double fraction, std::string_view step) {
         if (progress) progress(kLoaded + (kLearned - kLoaded) * fraction, step);
       },
@@ -216,20 +196,16 @@ Result<learning::SkillReport> Skills::LearnClaimed(const std::string& name,
   if (!version) return version.error();
   const learning::Skill skill = learned->Named(name, *version);
   const learning::SkillReport& report = skill.report();
-  const StoredVersion stored{.skill = name,
-                             .info = {.version = *version,
-                                      .current = true,
-                                      .method = report.method,
-                                      .trial_ids = TrialIds(report),
-                                      .learned = clock_.Now()},
-                             .target = report.target,
-                             .options = report.options,
-                             .document = learning::ToBytes(skill)};
-  // The last chance to turn back: from here on the version is there.
-  if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "learning was cancelled"};
-  if (const Status added = store_.AddVersion(stored); !added) return added.error();
-  SetCurrent(name, skill);
-  return report;
+  StoredVersion stored{.skill = name,
+                       .info = {.version = *version,
+                                .current = true,
+                                .method = report.method,
+                                .trial_ids = TrialIds(report),
+                                .learned = clock_.Now()},
+                       .target = report.target,
+                       .options = report.options,
+                       .document = learning::ToBytes(skill)};
+  return Learned{skill, std::move(stored)};
 }
 
 Result<std::vector<api::SkillInfo>> Skills::List() { return store_.ListSkills(); }

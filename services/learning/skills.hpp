@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -44,6 +45,21 @@ class Skills final : public api::SkillApi {
                                         const learning::SuggestOptions& options) override;
   Result<std::string> ExportJson(const std::string& name, int version) override;
 
+  /// Takes out the versions `removed` of one skill; the current one is learned anew from the trials
+  /// of it that are stored and not among `gone`, where that succeeds. Says what was done.
+  Result<std::vector<api::DataItem>> TakeOut(const std::string& name,
+                                             const std::vector<StoredVersion>& removed,
+                                             const TrialNames& gone,
+                                             const learning::Progress& progress,
+                                             const std::stop_token& stop);
+  /// Learns a version again that the store has lost; its trials are those that are stored.
+  Result<api::DataItem> Relearn(const Relearning& lost, const learning::Progress& progress,
+                                const std::stop_token& stop);
+  /// Does `work` while no skill can be learned or changed; refused where one is being.
+  Status WhileNobodyLearns(const std::function<Status()>& work);
+  /// Reads all anew: the store was changed from outside.
+  void Reload();
+
  private:
   class Claim;  ///< of the right to change one skill
 
@@ -52,6 +68,18 @@ class Skills final : public api::SkillApi {
                                              const learning::LearnOptions& options,
                                              const learning::Progress& progress,
                                              const std::stop_token& stop);
+  /// A skill that is learned but not stored.
+  struct Learned {
+    learning::Skill skill;
+    StoredVersion stored;
+  };
+  Result<Learned> LearnFrom(const std::string& name,
+                            const std::vector<learning::NamedTrial>& trials,
+                            const learning::LearnOptions& options,
+                            const learning::Progress& progress, const std::stop_token& stop);
+  /// Of the trials that are named, those that are stored and not among `gone`.
+  Result<Learned> LearnAgain(const Relearning& what, const TrialNames& gone,
+                             const learning::Progress& progress, const std::stop_token& stop);
   Result<std::vector<learning::NamedTrial>> LoadTrials(const std::string& skill,
                                                        const learning::LearnOptions& options,
                                                        const learning::Progress& progress,
@@ -69,7 +97,7 @@ class Skills final : public api::SkillApi {
   Log& log_;
 
   std::mutex claims_mutex_;
-  std::set<std::string> claims_;  ///< names of skills that are being changed
+  std::set<std::string> claims_;  ///< names of skills that are being changed; "": all
 
   std::shared_mutex current_mutex_;  ///< held for a look-up or an exchange only
   std::unordered_map<std::string, learning::Skill> current_;

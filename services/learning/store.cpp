@@ -4,108 +4,22 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "learning/compression.hpp"
+#include "learning/store_schema.hpp"
 
 namespace exemplar::learning_service {
 namespace {
 
-/// Step i brings a file from user_version i to i + 1. Never edited once released: only added to.
-constexpr std::array kSchemaSteps = {R"sql(
-CREATE TABLE trials (
-  number INTEGER PRIMARY KEY AUTOINCREMENT,
-  id TEXT NOT NULL UNIQUE,
-  skill TEXT NOT NULL,
-  source TEXT NOT NULL,
-  submitted_ns INTEGER NOT NULL,
-  info TEXT NOT NULL,
-  file BLOB NOT NULL
-) STRICT;
-CREATE INDEX trials_by_skill ON trials (skill, number);
-CREATE TABLE skills (
-  name TEXT PRIMARY KEY,
-  current INTEGER NOT NULL,
-  last INTEGER NOT NULL
-) STRICT;
-CREATE TABLE versions (
-  skill TEXT NOT NULL REFERENCES skills (name) ON DELETE CASCADE,
-  version INTEGER NOT NULL,
-  method TEXT NOT NULL,
-  target TEXT NOT NULL,
-  learned_ns INTEGER NOT NULL,
-  options TEXT NOT NULL,
-  trial_ids TEXT NOT NULL,
-  document BLOB NOT NULL,
-  PRIMARY KEY (skill, version)
-) STRICT;
-)sql",
-                                     R"sql(
-CREATE TABLE version_numbers (
-  skill TEXT PRIMARY KEY,
-  last INTEGER NOT NULL
-) STRICT;
-INSERT INTO version_numbers SELECT name, last FROM skills;
-ALTER TABLE skills DROP COLUMN last;
-)sql"};
-
-/// Makes the file ours to SQLite's `file` command and to Open: "Exmp".
-constexpr std::int64_t kApplicationId = 0x45786d70;
-
 using Json = nlohmann::json;
 
-std::string Dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-Result<Json> Parse(const std::string& text) {
-  Json json = Json::parse(text, nullptr, false);
-  if (json.is_discarded()) return Error{ErrorCode::kDataLoss, "a stored row is damaged"};
-  return json;
-}
-
-Result<std::int64_t> ReadPragma(Database& database, const std::string& name) {
-  Statement statement = database.Prepare("PRAGMA " + name);
-  const Result<bool> row = statement.Step();
-  if (!row) return row.error();
-  return statement.Integer(0);
-}
-
-Status Migrate(Database& database, const std::string& file) {
-  const Result<std::int64_t> application = ReadPragma(database, "application_id");
-  if (!application) return application.error();
-  const Result<std::int64_t> version = ReadPragma(database, "user_version");
-  if (!version) return version.error();
-  const auto newest = static_cast<std::int64_t>(kSchemaSteps.size());
-  if (*version > newest) {
-    return FailedPrecondition(file + " has schema " + std::to_string(*version) +
-                                  ", written by a newer program; this one knows up to " +
-                                  std::to_string(newest),
-                              "data_dir");
-  }
-  if (*version > 0 && *application != kApplicationId) {
-    return FailedPrecondition(file + " is a database of another program", "data_dir");
-  }
-  if (*version == newest) return {};
-  Result<Transaction> transaction = Transaction::Begin(database);
-  if (!transaction) return transaction.error();
-  for (std::int64_t step = *version; step < newest; ++step) {
-    if (Status done = database.Execute(kSchemaSteps[static_cast<std::size_t>(step)]); !done) {
-      return done;
-    }
-  }
-  if (Status marked = database.Execute("PRAGMA application_id = " + std::to_string(kApplicationId) +
-                                       "; PRAGMA user_version = " + std::to_string(newest));
-      !marked) {
-    return marked;
-  }
-  return transaction->Commit();
-}
-
-constexpr std::string_view kTrialColumns = "id, skill, source, submitted_ns, info";
+constexpr std::string_view kTrialColumns =
+    "id, skill, source, submitted_ns, info, coalesce(person, '')";
+constexpr std::string_view kTrialTables = " FROM trials LEFT JOIN trial_persons ON trial_id = id";
 
 Result<api::TrialInfo> ReadTrialRow(const Statement& row) {
   api::TrialInfo info;
@@ -113,7 +27,8 @@ Result<api::TrialInfo> ReadTrialRow(const Statement& row) {
   info.skill = row.Text(1);
   info.source = row.Text(2);
   info.submitted = Stamp::FromNanoseconds(row.Integer(3));
-  const Result<Json> json = Parse(row.Text(4));
+  info.person = row.Text(5);
+  const Result<Json> json = ParseJson(row.Text(4));
   if (!json) return WithPlace(json.error(), "trial " + info.id);
   info.duration_s = json->value("duration_s", 0.0);
   info.samples = json->value("samples", std::uint64_t{0});
@@ -147,8 +62,9 @@ struct Store::LockFile {
   int descriptor;
 };
 
-Store::Store(std::unique_ptr<LockFile> lock, std::unique_ptr<Database> database)
-    : lock_(std::move(lock)), database_(std::move(database)) {}
+Store::Store(std::filesystem::path folder, std::unique_ptr<LockFile> lock,
+             std::unique_ptr<Database> database)
+    : folder_(std::move(folder)), lock_(std::move(lock)), database_(std::move(database)) {}
 
 Store::~Store() = default;
 
@@ -158,13 +74,21 @@ Result<std::unique_ptr<Store>> Store::Open(const std::filesystem::path& folder) 
   if (error) return FailedPrecondition(folder.string() + ": " + error.message(), "data_dir");
   Result<std::unique_ptr<LockFile>> lock = LockFile::Take(folder / "learning.lock");
   if (!lock) return lock.error();
+  // What a restoring that broke off has left.
+  for (const char* left : {"restoring.db", "restoring.db-wal", "restoring.db-shm"}) {
+    std::filesystem::remove(folder / left, error);
+  }
+  // SQLite rewrites the database by way of a file of the same size: where there is room for it.
+  static_cast<void>(setenv("SQLITE_TMPDIR", folder.c_str(), 0));
   const std::filesystem::path file = folder / "learning.db";
   Result<std::unique_ptr<Database>> database = Database::Open(file);
   if (!database) return database.error();
   if (const Status migrated = Migrate(**database, file.string()); !migrated) {
     return migrated.error();
   }
-  return std::unique_ptr<Store>(new Store(*std::move(lock), *std::move(database)));
+  // A process that was killed leaves a log in which what was erased since may still stand.
+  if (const Status emptied = (*database)->EmptyWal(); !emptied) return emptied.error();
+  return std::unique_ptr<Store>(new Store(folder, *std::move(lock), *std::move(database)));
 }
 
 Status Store::AddTrial(const api::TrialInfo& info, std::string_view file) {
@@ -174,23 +98,32 @@ Status Store::AddTrial(const api::TrialInfo& info, std::string_view file) {
                      {"streams", info.streams},
                      {"notices", info.notices}};
   const std::lock_guard lock(mutex_);
-  return database_
-      ->Prepare(
-          "INSERT INTO trials (id, skill, source, submitted_ns, info, file)"
-          " VALUES (?, ?, ?, ?, ?, ?)")
-      .Bind(info.id)
-      .Bind(info.skill)
-      .Bind(info.source)
-      .Bind(info.submitted.nanoseconds())
-      .Bind(Dump(json))
-      .BindBlob(compressed)
-      .Run();
+  Result<Transaction> transaction = Transaction::Begin(*database_);
+  if (!transaction) return transaction.error();
+  if (Status added =
+          database_
+              ->Prepare("INSERT INTO trials (id, skill, source, submitted_ns, info, file)"
+                        " VALUES (?, ?, ?, ?, ?, ?)")
+              .Bind(info.id)
+              .Bind(info.skill)
+              .Bind(info.source)
+              .Bind(info.submitted.nanoseconds())
+              .Bind(DumpJson(json))
+              .BindBlob(compressed)
+              .Run();
+      !added) {
+    return added;
+  }
+  if (!info.person.empty()) {
+    if (Status set = PutPerson(*database_, info.id, info.person); !set) return set;
+  }
+  return transaction->Commit();
 }
 
 Result<std::optional<api::TrialInfo>> Store::FindTrial(const std::string& id) {
   const std::lock_guard lock(mutex_);
-  Statement statement =
-      database_->Prepare("SELECT " + std::string(kTrialColumns) + " FROM trials WHERE id = ?");
+  Statement statement = database_->Prepare("SELECT " + std::string(kTrialColumns) +
+                                           std::string(kTrialTables) + " WHERE id = ?");
   const Result<bool> row = statement.Bind(id).Step();
   if (!row) return row.error();
   if (!*row) return std::optional<api::TrialInfo>();
@@ -199,12 +132,14 @@ Result<std::optional<api::TrialInfo>> Store::FindTrial(const std::string& id) {
   return std::optional(*std::move(info));
 }
 
-Result<std::vector<api::TrialInfo>> Store::ListTrials(const std::string& skill) {
+Result<std::vector<api::TrialInfo>> Store::ListTrials(const std::string& skill,
+                                                      const std::string& person) {
   const std::lock_guard lock(mutex_);
   Statement statement =
-      database_->Prepare("SELECT " + std::string(kTrialColumns) +
-                         " FROM trials WHERE ?1 = '' OR skill = ?1 ORDER BY number");
-  statement.Bind(skill);
+      database_->Prepare("SELECT " + std::string(kTrialColumns) + std::string(kTrialTables) +
+                         " WHERE (?1 = '' OR skill = ?1) AND (?2 = '' OR person = ?2)"
+                         " ORDER BY number");
+  statement.Bind(skill).Bind(person);
   std::vector<api::TrialInfo> trials;
   for (;;) {
     const Result<bool> row = statement.Step();
@@ -233,9 +168,16 @@ Result<std::string> Store::TrialFile(const std::string& id) {
 
 Result<bool> Store::DeleteTrial(const std::string& id) {
   const std::lock_guard lock(mutex_);
-  const Status done = database_->Prepare("DELETE FROM trials WHERE id = ?").Bind(id).Run();
-  if (!done) return done.error();
-  return database_->changes() > 0;
+  Result<Transaction> transaction = Transaction::Begin(*database_);
+  if (!transaction) return transaction.error();
+  if (const Status done = database_->Prepare("DELETE FROM trials WHERE id = ?").Bind(id).Run();
+      !done) {
+    return done.error();
+  }
+  const bool was_there = database_->changes() > 0;
+  if (const Status pruned = PrunePersons(*database_); !pruned) return pruned.error();
+  if (const Status kept = transaction->Commit(); !kept) return kept.error();
+  return was_there;
 }
 
 Result<int> Store::NextVersion(const std::string& skill) {
@@ -251,6 +193,11 @@ Status Store::AddVersion(const StoredVersion& version) {
   const std::lock_guard lock(mutex_);
   Result<Transaction> transaction = Transaction::Begin(*database_);
   if (!transaction) return transaction.error();
+  if (Status added = InsertVersion(version, document); !added) return added;
+  return transaction->Commit();
+}
+
+Status Store::InsertVersion(const StoredVersion& version, const std::string& document) {
   for (const char* sql : {"INSERT INTO skills (name, current) VALUES (?1, ?2)"
                           " ON CONFLICT (name) DO UPDATE SET current = ?2",
                           "INSERT INTO version_numbers (skill, last) VALUES (?1, ?2)"
@@ -258,23 +205,19 @@ Status Store::AddVersion(const StoredVersion& version) {
     Status numbered = database_->Prepare(sql).Bind(version.skill).Bind(version.info.version).Run();
     if (!numbered) return numbered;
   }
-  if (Status added =
-          database_
-              ->Prepare("INSERT INTO versions (skill, version, method, target, learned_ns,"
-                        " options, trial_ids, document) VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
-              .Bind(version.skill)
-              .Bind(version.info.version)
-              .Bind(version.info.method)
-              .Bind(version.target)
-              .Bind(version.info.learned.nanoseconds())
-              .Bind(Dump(version.options))
-              .Bind(Dump(version.info.trial_ids))
-              .BindBlob(document)
-              .Run();
-      !added) {
-    return added;
-  }
-  return transaction->Commit();
+  return database_
+      ->Prepare(
+          "INSERT INTO versions (skill, version, method, target, learned_ns,"
+          " options, trial_ids, document) VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
+      .Bind(version.skill)
+      .Bind(version.info.version)
+      .Bind(version.info.method)
+      .Bind(version.target)
+      .Bind(version.info.learned.nanoseconds())
+      .Bind(DumpJson(version.options))
+      .Bind(DumpJson(version.info.trial_ids))
+      .BindBlob(document)
+      .Run();
 }
 
 Result<std::vector<api::SkillInfo>> Store::ListSkills() {
@@ -309,7 +252,7 @@ Result<std::vector<api::VersionInfo>> Store::ListVersions(const std::string& ski
     const Result<bool> row = statement.Step();
     if (!row) return row.error();
     if (!*row) return versions;
-    const Result<Json> ids = Parse(statement.Text(3));
+    const Result<Json> ids = ParseJson(statement.Text(3));
     if (!ids) return WithPlace(ids.error(), "skill " + skill);
     versions.push_back({.version = static_cast<int>(statement.Integer(0)),
                         .current = statement.Integer(1) != 0,
@@ -347,9 +290,16 @@ Status Store::SetCurrent(const std::string& skill, int version) {
 
 Result<bool> Store::DeleteSkill(const std::string& skill) {
   const std::lock_guard lock(mutex_);
-  const Status done = database_->Prepare("DELETE FROM skills WHERE name = ?").Bind(skill).Run();
-  if (!done) return done.error();
-  return database_->changes() > 0;
+  Result<Transaction> transaction = Transaction::Begin(*database_);
+  if (!transaction) return transaction.error();
+  if (const Status done = database_->Prepare("DELETE FROM skills WHERE name = ?").Bind(skill).Run();
+      !done) {
+    return done.error();
+  }
+  const bool was_there = database_->changes() > 0;
+  if (const Status pruned = PrunePersons(*database_); !pruned) return pruned.error();
+  if (const Status kept = transaction->Commit(); !kept) return kept.error();
+  return was_there;
 }
 
 }  // namespace exemplar::learning_service

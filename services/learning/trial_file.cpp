@@ -5,6 +5,7 @@
 
 #include "exemplar/base/ids.hpp"
 #include "exemplar/demonstration/csv.hpp"
+#include "exemplar/recording/about.hpp"
 
 namespace exemplar::learning_service {
 namespace {
@@ -82,6 +83,14 @@ Result<demonstration::Trial> ReadTrialFile(std::string_view name, std::string_vi
   Error error = trial.error();
   if (error.field.empty()) error.field = "file";
   return error;
+}
+
+std::string PersonOfFile(std::string_view bytes) {
+  if (bytes.substr(0, kMcapMagic.size()) != kMcapMagic) return {};
+  recording::MemorySource source(
+      {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  const Result<recording::About> about = recording::ReadAbout(source);
+  return about ? about->person() : std::string();
 }
 
 std::string TrialFingerprint(const demonstration::Trial& trial) {

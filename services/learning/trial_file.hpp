@@ -20,6 +20,10 @@ using McapTrialReader =
 Result<demonstration::Trial> ReadTrialFile(std::string_view name, std::string_view bytes,
                                            const McapTrialReader& read_mcap);
 
+/// The person whom an MCAP recording names in its metadata ("exemplar.labels", the last one, before
+/// "exemplar.trial": "person"); empty where it names none or is no MCAP file.
+std::string PersonOfFile(std::string_view bytes);
+
 /// The same for trials that SameContent holds equal, other for others but for chance.
 std::string TrialFingerprint(const demonstration::Trial& trial);
 

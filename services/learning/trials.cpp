@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "exemplar/api/data.hpp"
 #include "exemplar/base/ids.hpp"
 #include "exemplar/demonstration/csv.hpp"
 
@@ -59,9 +60,28 @@ Result<demonstration::Trial> Trials::Read(std::string_view name, std::string_vie
   return ReadTrialFile(name, bytes, read_mcap_);
 }
 
+Result<api::SubmitResult> Trials::Duplicate(api::TrialInfo stored, const std::string& person) {
+  if (!person.empty() && stored.person.empty()) {
+    const Result<bool> set = store_.SetPerson(stored.id, person);
+    if (!set) return set.error();
+    stored.person = person;
+  }
+  if (!person.empty() && stored.person != person) {
+    return FailedPrecondition("trial \"" + stored.id +
+                                  "\" is stored already as another person's; `exemplar trial "
+                                  "set-person` changes whose it is",
+                              "person");
+  }
+  return api::SubmitResult{.info = std::move(stored), .duplicate = true};
+}
+
 Result<api::SubmitResult> Trials::Submit(const std::string& skill, const std::string& name,
-                                         std::string file) {
+                                         std::string file, const std::string& given_person) {
   if (const Status valid = CheckSkillName(skill, "skill"); !valid) return valid.error();
+  const std::string person = given_person.empty() ? PersonOfFile(file) : given_person;
+  if (!person.empty()) {
+    if (const Status valid = api::CheckPerson(person, "person"); !valid) return valid.error();
+  }
   const Result<demonstration::Trial> trial = Read(name, file);
   if (!trial) return trial.error();
   const std::lock_guard lock(submit_mutex_);
@@ -73,7 +93,7 @@ Result<api::SubmitResult> Trials::Submit(const std::string& skill, const std::st
       const Result<demonstration::Trial> stored = Load(id);
       if (!stored) return stored.error();
       if (!SameContent(*stored, *trial)) continue;
-      return api::SubmitResult{.info = **std::move(found), .duplicate = true};
+      return Duplicate(**std::move(found), person);
     }
     api::TrialInfo info{.id = id,
                         .skill = skill,
@@ -82,14 +102,16 @@ Result<api::SubmitResult> Trials::Submit(const std::string& skill, const std::st
                         .duration_s = trial->duration_s(),
                         .streams = StreamNames(*trial),
                         .samples = SampleCount(*trial),
-                        .notices = trial->notices};
+                        .notices = trial->notices,
+                        .person = person};
     if (const Status added = store_.AddTrial(info, file); !added) return added.error();
     return api::SubmitResult{.info = std::move(info), .duplicate = false};
   }
 }
 
-Result<std::vector<api::TrialInfo>> Trials::List(const std::string& skill) {
-  return store_.ListTrials(skill);
+Result<std::vector<api::TrialInfo>> Trials::List(const std::string& skill,
+                                                 const std::string& person) {
+  return store_.ListTrials(skill, person);
 }
 
 Result<api::TrialInfo> Trials::Get(const std::string& id) {
@@ -131,6 +153,18 @@ Status Trials::Delete(const std::string& id) {
   const Result<bool> deleted = store_.DeleteTrial(id);
   if (!deleted) return deleted.error();
   if (!*deleted) return NotFound("there is no trial \"" + id + "\"", "id");
+  return {};
+}
+
+Status Trials::SetPerson(const std::string& id, const std::string& person) {
+  if (!person.empty()) {
+    if (Status valid = api::CheckPerson(person, "person"); !valid) return valid;
+  }
+  const Result<bool> set = store_.SetPerson(id, person);
+  if (!set) return set.error();
+  if (!*set) {
+    return NotFound("there is no trial \"" + id + "\", and no skill was learned from one", "id");
+  }
   return {};
 }
 

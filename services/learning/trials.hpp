@@ -18,8 +18,9 @@ class Trials final : public api::TrialApi {
          std::shared_ptr<const demonstration::ToolKinematics> tool, McapTrialReader read_mcap);
 
   Result<api::SubmitResult> Submit(const std::string& skill, const std::string& name,
-                                   std::string file) override;
-  Result<std::vector<api::TrialInfo>> List(const std::string& skill) override;
+                                   std::string file, const std::string& person = {}) override;
+  Result<std::vector<api::TrialInfo>> List(const std::string& skill,
+                                           const std::string& person = {}) override;
   Result<api::TrialInfo> Get(const std::string& id) override;
   Result<demonstration::Trial> Load(const std::string& id) override;
   Result<api::TrialSegments> Segments(const std::string& id,
@@ -29,11 +30,15 @@ class Trials final : public api::TrialApi {
       const std::map<std::string, std::string>& options) override;
   Result<std::string> ExportCsv(const std::string& id) override;
   Status Delete(const std::string& id) override;
+  Status SetPerson(const std::string& id, const std::string& person) override;
 
   /// A trial from a file's bytes, stored or not.
   Result<demonstration::Trial> Read(std::string_view name, std::string_view bytes) const;
 
  private:
+  /// The stored trial is said to be `person`'s once more.
+  Result<api::SubmitResult> Duplicate(api::TrialInfo stored, const std::string& person);
+
   Store& store_;
   const Clock& clock_;
   const std::shared_ptr<const demonstration::ToolKinematics> tool_;

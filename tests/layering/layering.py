@@ -48,6 +48,7 @@ LIBRARIES = {
     "security": ["base"],
     "program": ["base", "security"],
     "bus": ["base", "geometry", "demonstration", "ircp", "recording", "security"],
+    "backup": ["base", "api", "security"],
     "rpc": ["base", "geometry", "demonstration", "learning", "api", "security"],
 }
 

@@ -12,6 +12,7 @@
 #include "exemplar/base/clock.hpp"
 #include "exemplar/rpc/client.hpp"
 #include "exemplar/rpc/server.hpp"
+#include "learning/data.hpp"
 #include "learning/skills.hpp"
 #include "learning/store.hpp"
 #include "learning/trials.hpp"
@@ -33,7 +34,9 @@ struct Service {
     store = *std::move(opened);
     trials = std::make_unique<Trials>(*store, clock, nullptr, NoMcap);
     skills = std::make_unique<Skills>(*store, *trials, clock, nullptr, log);
-    auto started = rpc::Server::Create({}, {.trials = trials.get(), .skills = skills.get()});
+    data = std::make_unique<Data>(*store, *skills, clock, log, Retention{});
+    auto started = rpc::Server::Create(
+        {}, {.trials = trials.get(), .skills = skills.get(), .learning_data = data.get()});
     EXPECT_TRUE(started.ok()) << started.error().message;
     server = *std::move(started);
     auto connected = rpc::Connect({.server = server->address()});
@@ -46,6 +49,7 @@ struct Service {
   std::unique_ptr<Store> store;
   std::unique_ptr<Trials> trials;
   std::unique_ptr<Skills> skills;
+  std::unique_ptr<Data> data;
   std::unique_ptr<rpc::Server> server;
   rpc::Clients client;
 };

@@ -46,20 +46,23 @@ class Gate {
 class ScriptedTrials final : public api::TrialApi {
  public:
   Result<api::SubmitResult> Submit(const std::string& skill, const std::string& name,
-                                   std::string file) override {
+                                   std::string file, const std::string& person) override {
     if (failure) return *failure;
     last_file = std::move(file);
     api::SubmitResult result;
     result.info.skill = skill;
     result.info.source = name;
+    result.info.person = person;
     result.duplicate = true;
     return result;
   }
-  Result<std::vector<api::TrialInfo>> List(const std::string& skill) override {
+  Result<std::vector<api::TrialInfo>> List(const std::string& skill,
+                                           const std::string& person) override {
     if (failure) return *failure;
     Rng rng(1);
     std::vector<api::TrialInfo> list = {RandomTrialInfo(rng), RandomTrialInfo(rng)};
     list[1].skill = skill;
+    list[1].person = person;
     return list;
   }
   Result<api::TrialInfo> Get(const std::string& id) override {

@@ -84,6 +84,8 @@ Result<Clients> Connect(const ClientOptions& options) {
   clients.executor = MakeExecutorClient(*connection);
   clients.recorder = MakeRecorderClient(*connection);
   clients.topics = MakeTopicClient(*connection);
+  clients.learning_data = MakeLearningDataClient(*connection);
+  clients.recorder_data = MakeRecorderDataClient(*connection);
   return clients;
 }
 

@@ -91,6 +91,8 @@ std::unique_ptr<api::TrialApi> MakeTrialClient(std::shared_ptr<Connection> conne
 std::unique_ptr<api::SkillApi> MakeSkillClient(std::shared_ptr<Connection> connection);
 std::unique_ptr<api::ExecutorApi> MakeExecutorClient(std::shared_ptr<Connection> connection);
 std::unique_ptr<api::RecorderApi> MakeRecorderClient(std::shared_ptr<Connection> connection);
+std::unique_ptr<api::DataApi> MakeLearningDataClient(std::shared_ptr<Connection> connection);
+std::unique_ptr<api::DataApi> MakeRecorderDataClient(std::shared_ptr<Connection> connection);
 std::unique_ptr<api::TopicApi> MakeTopicClient(std::shared_ptr<Connection> connection);
 
 }  // namespace exemplar::rpc

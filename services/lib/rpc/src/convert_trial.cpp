@@ -42,6 +42,7 @@ void ToProto(const api::TrialInfo& info, v1::TrialInfo* message) {
   ToProto(info.streams, message->mutable_streams());
   message->set_samples(info.samples);
   ToProto(info.notices, message->mutable_notices());
+  message->set_person(Utf8(info.person));
 }
 
 api::TrialInfo FromProto(const v1::TrialInfo& message) {
@@ -54,6 +55,7 @@ api::TrialInfo FromProto(const v1::TrialInfo& message) {
   info.streams = FromProto(message.streams());
   info.samples = message.samples();
   info.notices = FromProto(message.notices());
+  info.person = message.person();
   return info;
 }
 

@@ -16,6 +16,7 @@ constexpr std::array kRules = {
     MethodRule{"exemplar.v1.TrialService/Segments", Role::kObserve, CallLength::kLong},
     MethodRule{"exemplar.v1.TrialService/Export", Role::kObserve, CallLength::kLong},
     MethodRule{"exemplar.v1.TrialService/Delete", Role::kTeach, CallLength::kShort, true},
+    MethodRule{"exemplar.v1.TrialService/SetPerson", Role::kTeach, CallLength::kShort, true},
 
     MethodRule{"exemplar.v1.SkillService/Learn", Role::kTeach, CallLength::kLong},
     MethodRule{"exemplar.v1.SkillService/Get", Role::kObserve},
@@ -53,6 +54,26 @@ constexpr std::array kRules = {
     MethodRule{"exemplar.v1.TopicService/List", Role::kObserve},
     MethodRule{"exemplar.v1.TopicService/Subscribe", Role::kObserve, CallLength::kLong},
     MethodRule{"exemplar.v1.TopicService/Publish", Role::kAdminister, CallLength::kShort, true},
+
+    MethodRule{"exemplar.v1.LearningDataService/ListPersons", Role::kTeach},
+    MethodRule{"exemplar.v1.LearningDataService/ErasePerson", Role::kAdminister, CallLength::kLong,
+               true},
+    MethodRule{"exemplar.v1.LearningDataService/ApplyRetention", Role::kAdminister,
+               CallLength::kLong, true},
+    MethodRule{"exemplar.v1.LearningDataService/Backup", Role::kAdminister, CallLength::kLong,
+               true},
+    MethodRule{"exemplar.v1.LearningDataService/Restore", Role::kAdminister, CallLength::kLong,
+               true},
+
+    MethodRule{"exemplar.v1.RecorderDataService/ListPersons", Role::kTeach},
+    MethodRule{"exemplar.v1.RecorderDataService/ErasePerson", Role::kAdminister, CallLength::kLong,
+               true},
+    MethodRule{"exemplar.v1.RecorderDataService/ApplyRetention", Role::kAdminister,
+               CallLength::kLong, true},
+    MethodRule{"exemplar.v1.RecorderDataService/Backup", Role::kAdminister, CallLength::kLong,
+               true},
+    MethodRule{"exemplar.v1.RecorderDataService/Restore", Role::kAdminister, CallLength::kLong,
+               true},
 };
 
 }  // namespace

@@ -41,6 +41,8 @@ std::vector<std::string> ServicesOf(const Services& services) {
   if (services.executor) names.emplace_back("exemplar.v1.ExecutorService");
   if (services.recorder) names.emplace_back("exemplar.v1.RecorderService");
   if (services.topics) names.emplace_back("exemplar.v1.TopicService");
+  if (services.learning_data) names.emplace_back("exemplar.v1.LearningDataService");
+  if (services.recorder_data) names.emplace_back("exemplar.v1.RecorderDataService");
   for (const Backend& backend : services.backends) {
     names.insert(names.end(), backend.services.begin(), backend.services.end());
   }
@@ -70,6 +72,12 @@ class GrpcServer final : public Server {
     if (services.executor) services_.push_back(MakeExecutorService(shared_, *services.executor));
     if (services.recorder) services_.push_back(MakeRecorderService(shared_, *services.recorder));
     if (services.topics) services_.push_back(MakeTopicService(shared_, *services.topics));
+    if (services.learning_data) {
+      services_.push_back(MakeLearningDataService(shared_, *services.learning_data));
+    }
+    if (services.recorder_data) {
+      services_.push_back(MakeRecorderDataService(shared_, *services.recorder_data));
+    }
 
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();

@@ -168,6 +168,8 @@ std::unique_ptr<grpc::Service> MakeExecutorService(ServerShared& shared,
                                                    api::ExecutorApi& executor);
 std::unique_ptr<grpc::Service> MakeRecorderService(ServerShared& shared,
                                                    api::RecorderApi& recorder);
+std::unique_ptr<grpc::Service> MakeLearningDataService(ServerShared& shared, api::DataApi& data);
+std::unique_ptr<grpc::Service> MakeRecorderDataService(ServerShared& shared, api::DataApi& data);
 std::unique_ptr<grpc::Service> MakeTopicService(ServerShared& shared, api::TopicApi& topics);
 
 }  // namespace exemplar::rpc

@@ -13,8 +13,9 @@ class TrialClient final : public api::TrialApi {
       : connection_(std::move(connection)), stub_(connection_->channel()) {}
 
   Result<api::SubmitResult> Submit(const std::string& skill, const std::string& name,
-                                   std::string file) override {
+                                   std::string file, const std::string& person) override {
     v1::SubmitTrialRequest header;
+    header.mutable_header()->set_person(Utf8(person));
     header.mutable_header()->set_skill(Utf8(skill));
     header.mutable_header()->set_name(Utf8(name));
     const auto context = connection_->Begin();
@@ -26,8 +27,10 @@ class TrialClient final : public api::TrialApi {
     return api::SubmitResult{FromProto(response.trial()), response.duplicate()};
   }
 
-  Result<std::vector<api::TrialInfo>> List(const std::string& skill) override {
+  Result<std::vector<api::TrialInfo>> List(const std::string& skill,
+                                           const std::string& person) override {
     v1::ListTrialsRequest request;
+    request.set_person(Utf8(person));
     request.set_skill(Utf8(skill));
     const auto response = Call(*connection_, stub_, &Stub::List, request);
     if (!response) return response.error();
@@ -78,6 +81,15 @@ class TrialClient final : public api::TrialApi {
     v1::DeleteTrialRequest request;
     request.set_id(Utf8(id));
     const auto response = Call(*connection_, stub_, &Stub::Delete, request);
+    if (!response) return response.error();
+    return {};
+  }
+
+  Status SetPerson(const std::string& id, const std::string& person) override {
+    v1::SetTrialPersonRequest request;
+    request.set_id(Utf8(id));
+    request.set_person(Utf8(person));
+    const auto response = Call(*connection_, stub_, &Stub::SetPerson, request);
     if (!response) return response.error();
     return {};
   }

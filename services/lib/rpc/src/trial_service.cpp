@@ -20,7 +20,7 @@ class TrialService final : public v1::TrialService::Service {
       if (context->IsCancelled()) return Error{ErrorCode::kCancelled, "the upload broke off"};
       if (header.skill().empty()) return InvalidArgument("skill is empty", "header.skill");
       Result<api::SubmitResult> result =
-          trials_.Submit(header.skill(), header.name(), std::move(file));
+          trials_.Submit(header.skill(), header.name(), std::move(file), header.person());
       if (!result) return result.error();
       ToProto(result->info, response->mutable_trial());
       response->set_duplicate(result->duplicate);
@@ -31,7 +31,8 @@ class TrialService final : public v1::TrialService::Service {
   grpc::Status List(grpc::ServerContext* context, const v1::ListTrialsRequest* request,
                     v1::ListTrialsResponse* response) override {
     return Serve(shared_, *context, "exemplar.v1.TrialService/List", [&]() -> Status {
-      const Result<std::vector<api::TrialInfo>> list = trials_.List(request->skill());
+      const Result<std::vector<api::TrialInfo>> list =
+          trials_.List(request->skill(), request->person());
       if (!list) return list.error();
       for (const api::TrialInfo& info : *list) ToProto(info, response->add_trials());
       return {};
@@ -88,6 +89,12 @@ class TrialService final : public v1::TrialService::Service {
                       v1::DeleteTrialResponse*) override {
     return Serve(shared_, *context, "exemplar.v1.TrialService/Delete", request->id(),
                  [&] { return trials_.Delete(request->id()); });
+  }
+
+  grpc::Status SetPerson(grpc::ServerContext* context, const v1::SetTrialPersonRequest* request,
+                         v1::SetTrialPersonResponse*) override {
+    return Serve(shared_, *context, "exemplar.v1.TrialService/SetPerson", request->id(),
+                 [&] { return trials_.SetPerson(request->id(), request->person()); });
   }
 
  private:

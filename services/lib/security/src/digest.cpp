@@ -58,6 +58,49 @@ std::string RandomText(std::size_t count) {
 
 std::string MakeToken() { return "exm_" + RandomText(32); }
 
+struct Sha256::State {
+  State() : context(EVP_MD_CTX_new()) {
+    // It fails for lack of memory only.
+    if (context == nullptr || EVP_DigestInit_ex(context, EVP_sha256(), nullptr) != 1) std::abort();
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() { EVP_MD_CTX_free(context); }
+  EVP_MD_CTX* context;
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {}
+Sha256::~Sha256() = default;
+Sha256::Sha256(Sha256&&) noexcept = default;
+Sha256& Sha256::operator=(Sha256&&) noexcept = default;
+
+void Sha256::Add(std::string_view bytes) {
+  EVP_DigestUpdate(state_->context, bytes.data(), bytes.size());
+}
+
+std::string Sha256::Hex() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  EVP_DigestFinal_ex(state_->context, digest.data(), &size);
+  return security::Hex(digest.data(), size);
+}
+
+std::string PersonHash(std::string_view salt, std::string_view person) {
+  constexpr int kRounds = 100'000;
+  std::array<unsigned char, 32> hash{};
+  PKCS5_PBKDF2_HMAC(person.data(), static_cast<int>(person.size()),
+                    reinterpret_cast<const unsigned char*>(salt.data()),
+                    static_cast<int>(salt.size()), kRounds, EVP_sha256(),
+                    static_cast<int>(hash.size()), hash.data());
+  return Hex(hash.data(), hash.size());
+}
+
+const std::string& PersonHasher::Hash(const std::string& salt, const std::string& person) {
+  std::string& hash = known_[{salt, person}];
+  if (hash.empty()) hash = PersonHash(salt, person);
+  return hash;
+}
+
 bool EqualInConstantTime(std::string_view a, std::string_view b) {
   return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }

@@ -29,6 +29,7 @@ struct TrialInfo {
   std::vector<std::string> streams;  ///< "joints (9)", "end effector", "object target", ...
   std::uint64_t samples = 0;
   std::vector<std::string> notices;
+  std::string person = {};  ///< whose demonstration it is, a pseudonymous id; empty: unknown
 };
 
 struct SubmitResult {
@@ -47,11 +48,13 @@ class TrialApi {
  public:
   virtual ~TrialApi() = default;
   /// `file` is a CSV or MCAP file's bytes; `name` its name (for errors, and to tell the format by
-  /// the ending; content decides where the ending does not). Durable when it returns.
+  /// the ending; content decides where the ending does not). Durable when it returns. `person`
+  /// empty: as the recording's metadata "person" says, else unknown.
   virtual Result<SubmitResult> Submit(const std::string& skill, const std::string& name,
-                                      std::string file) = 0;
-  virtual Result<std::vector<TrialInfo>> List(
-      const std::string& skill) = 0;  ///< empty: of all skills
+                                      std::string file, const std::string& person = {}) = 0;
+  /// Empty: of all skills, of everybody.
+  virtual Result<std::vector<TrialInfo>> List(const std::string& skill,
+                                              const std::string& person = {}) = 0;
   virtual Result<TrialInfo> Get(const std::string& id) = 0;
   virtual Result<demonstration::Trial> Load(const std::string& id) = 0;
   /// Of a stored trial, or of a file that is not stored.
@@ -62,6 +65,11 @@ class TrialApi {
       const std::map<std::string, std::string>& options) = 0;
   virtual Result<std::string> ExportCsv(const std::string& id) = 0;
   virtual Status Delete(const std::string& id) = 0;
+  /// Whose demonstration a trial is (empty: unknown): of a stored one, or of one that a skill
+  /// version was learned from.
+  virtual Status SetPerson(const std::string& /*id*/, const std::string& /*person*/) {
+    return FailedPrecondition("these trials keep no persons");
+  }
 };
 
 // ---------------------------------------------------------------- skills

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "exemplar/api/data.hpp"
 #include "exemplar/api/services.hpp"
 #include "exemplar/api/topics.hpp"
 #include "exemplar/base/result.hpp"
@@ -30,7 +31,7 @@ struct ClientOptions {
 };
 
 /// One connection to one server, shared by all clients. Whether the server has a service shows
-/// when it is called: kUnavailable with the address where nobody answers, kFailedPrecondition where
+/// when it is called: kUnavailable with the address where nobody answers, kUnimplemented where
 /// that server does not serve it. Errors carry the code, message and field that the server gave.
 struct Clients {
   std::unique_ptr<api::TrialApi> trials;
@@ -38,6 +39,8 @@ struct Clients {
   std::unique_ptr<api::ExecutorApi> executor;
   std::unique_ptr<api::RecorderApi> recorder;
   std::unique_ptr<api::TopicApi> topics;  ///< of a gateway
+  std::unique_ptr<api::DataApi> learning_data;
+  std::unique_ptr<api::DataApi> recorder_data;
 };
 
 /// Does not wait for the server. Errors: an address that is none, credentials that cannot be read

@@ -17,7 +17,7 @@ struct MethodRule {
   std::string_view method;  ///< "exemplar.v1.SkillService/Query"
   security::Role role;
   CallLength length = CallLength::kShort;
-  bool audited = false;  ///< moves the robot or deletes
+  bool audited = false;  ///< moves the robot, deletes, or takes all data out
 };
 
 /// All methods of package exemplar.v1; the health service and reflection ask for no role.

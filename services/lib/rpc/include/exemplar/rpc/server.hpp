@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "exemplar/api/data.hpp"
 #include "exemplar/api/json_calls.hpp"
 #include "exemplar/api/services.hpp"
 #include "exemplar/api/topics.hpp"
@@ -41,6 +42,8 @@ struct Services {
   api::ExecutorApi* executor = nullptr;
   api::RecorderApi* recorder = nullptr;
   api::TopicApi* topics = nullptr;
+  api::DataApi* learning_data = nullptr;
+  api::DataApi* recorder_data = nullptr;
   /// Their calls go on with deadline, cancellation and metadata, message by message; health and
   /// reflection speak for them. Methods that are newer than this server go on as well.
   std::vector<Backend> backends = {};
@@ -53,7 +56,7 @@ struct CallRecord {
   std::string_view peer = {};        ///< "ipv4:127.0.0.1:40312"
   std::string_view caller = {};      ///< the caller's name; empty where nobody has to have one
   std::string_view target = {};      ///< what the call was about ("press"), where it is audited
-  /// "ok", the name of the ErrorCode, or "unauthenticated", "permission_denied", "rate_limited".
+  /// "ok", the name of the ErrorCode, or "rate_limited".
   std::string_view outcome = {};
   bool audited = false;  ///< moves the robot or deletes: who did it must be known later
   Status status = {};
