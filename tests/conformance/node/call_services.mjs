@@ -1,6 +1,7 @@
 // Calls every method of every service of a server, with nothing but what its reflection tells: no .proto file and no code
 // of ours. Prints a JSON object of method -> status code; what is wrong ends it with a stack trace.
 //   node call_services.mjs HOST:PORT TRIAL.csv...
+// With EXEMPLAR_TLS_CA over TLS, with EXEMPLAR_TLS_CERT and EXEMPLAR_TLS_KEY a certificate is shown, with EXEMPLAR_TOKEN a token.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
@@ -11,8 +12,24 @@ import { GrpcReflection } from "grpc-js-reflection-client";
 const [address, ...files] = process.argv.slice(2);
 const OK = grpc.status.OK;
 const PRECONDITION = grpc.status.FAILED_PRECONDITION;
-const plain = grpc.credentials.createInsecure();
-const reflection = new GrpcReflection(address, plain, {}, "v1alpha");
+const { EXEMPLAR_TLS_CA, EXEMPLAR_TLS_CERT, EXEMPLAR_TLS_KEY, EXEMPLAR_TOKEN } = process.env;
+const read = (path) => (path ? readFileSync(path) : null);
+
+/** What is shown to the server: nothing in plain text, else as the environment says. */
+function credentials() {
+  if (!EXEMPLAR_TLS_CA) return grpc.credentials.createInsecure();
+  const ssl = grpc.credentials.createSsl(read(EXEMPLAR_TLS_CA), read(EXEMPLAR_TLS_KEY), read(EXEMPLAR_TLS_CERT));
+  if (!EXEMPLAR_TOKEN) return ssl;
+  const token = grpc.credentials.createFromMetadataGenerator((_, done) => {
+    const metadata = new grpc.Metadata();
+    metadata.set("authorization", `Bearer ${EXEMPLAR_TOKEN}`);
+    done(null, metadata);
+  });
+  return grpc.credentials.combineChannelCredentials(ssl, token);
+}
+
+const shown = credentials();
+const reflection = new GrpcReflection(address, shown, {}, "v1alpha");
 const LOAD = { keepCase: true, longs: Number, enums: String, defaults: true, oneofs: true };
 
 const at = (object, path) => path.split(".").reduce((place, name) => place[name], object);
@@ -22,7 +39,7 @@ const answers = {};
 async function stub(service) {
   const descriptor = await reflection.getDescriptorBySymbol(service);
   const Service = at(descriptor.getPackageObject(LOAD), service);
-  return { client: new Service(address, plain), methods: Service.service };
+  return { client: new Service(address, shown), methods: Service.service };
 }
 
 /** One call of any kind; all messages that came, or the error. */
@@ -177,7 +194,7 @@ async function health(names) {
     const bytes = Buffer.from(name);
     return bytes.length ? Buffer.concat([Buffer.from([0x0a, bytes.length]), bytes]) : Buffer.alloc(0);
   };
-  const client = new grpc.Client(address, plain);
+  const client = new grpc.Client(address, shown);
   for (const name of ["", ...names]) {
     const state = await new Promise((resolve, reject) =>
       client.makeUnaryRequest("/grpc.health.v1.Health/Check", send, (bytes) => bytes, name, (error, bytes) =>
