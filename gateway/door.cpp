@@ -14,14 +14,24 @@ constexpr const char* kCsrfHeader = "X-CSRF-Token";
 constexpr const char* kJson = "application/json";
 
 constexpr const char* kLoginPage = R"(<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Exemplar</title>
+<html lang="en"><head><meta charset="utf-8"><title>Log in: Exemplar</title>
 <meta name="viewport" content="width=device-width">
-<style>body{font:16px sans-serif;max-width:28em;margin:4em auto}input,button{font:inherit;padding:.4em}
-input{width:100%;box-sizing:border-box;margin:.5em 0 1em}</style></head>
-<body><h1>Exemplar</h1><form method="post" action="/login">
+<link rel="stylesheet" href="/login.css"></head>
+<body><main><h1>Exemplar</h1><form method="post" action="/login">
 <label for="token">Token (<code>exemplar security token</code> makes one)</label>
 <input id="token" name="token" type="password" autocomplete="current-password" required autofocus>
-<button>Log in</button></form></body></html>
+<button>Log in</button></form></main></body></html>
+)";
+
+constexpr const char* kLoginStyle = R"(:root{color-scheme:light dark}
+body{font:16px/1.5 system-ui,sans-serif;margin:0;background:#f4f5f7;color:#1b2430}
+main{max-width:24em;margin:16vh auto 0;padding:1.5em;background:#fff;border-radius:12px;box-shadow:0 1px 3px #0003}
+h1{font-size:1.3em;margin:0 0 1em}
+input,button{font:inherit;padding:.5em .7em;border-radius:8px;border:1px solid #6b7685;box-sizing:border-box;width:100%}
+input{margin:.4em 0 1em;background:transparent;color:inherit}
+button{background:#1f5fbf;border-color:#1f5fbf;color:#fff;font-weight:600;cursor:pointer}
+:focus-visible{outline:3px solid #5b9dff;outline-offset:2px}
+@media (prefers-color-scheme:dark){body{background:#10151c;color:#e3e8ef}main{background:#19212b}}
 )";
 
 http::Response Said(int status, const std::string& code, const std::string& message) {
@@ -151,7 +161,7 @@ http::Response Door::LogIn(const http::Request& request) {
   log_.Info("audit", {{"caller", caller->name}, {"method", "login"}, {"peer", request.peer}});
   http::Response response;
   if (is_form) {
-    response = {303, {{"Location", "/session"}}, ""};
+    response = {303, {{"Location", "/"}}, ""};
   } else {
     const Json body = {{"name", caller->name}, {"csrf", opened.csrf}};
     response = http::Answer(body.dump() + "\n", kJson);
@@ -179,18 +189,23 @@ http::Response Door::Tell(const http::Request& request) {
 
 Status Door::AddRoutes(http::Server& server) {
   constexpr std::size_t kLoginBytes = 4096;
-  Status added = server.Route(
-      http::Method::kGet, "/login",
-      [](const http::Request&) {
-        http::Response page = http::Answer(kLoginPage, "text/html; charset=utf-8");
-        page.headers.Set("Content-Security-Policy",
-                         "default-src 'none'; style-src 'unsafe-inline'; form-action 'self'; "
-                         "frame-ancestors 'none'; base-uri 'none'");
-        page.headers.Set("X-Content-Type-Options", "nosniff");
-        page.headers.Set("Referrer-Policy", "no-referrer");
-        page.headers.Set("Cache-Control", "no-store");
-        return page;
-      },
+  Status added =
+      server.Route(http::Method::kGet, "/login",
+                   [](const http::Request&) {
+                     http::Response page = http::Answer(kLoginPage, "text/html; charset=utf-8");
+                     page.headers.Set("Content-Security-Policy",
+                                      "default-src 'none'; style-src 'self'; form-action 'self'; "
+                                      "frame-ancestors 'none'; base-uri 'none'");
+                     page.headers.Set("X-Content-Type-Options", "nosniff");
+                     page.headers.Set("Referrer-Policy", "no-referrer");
+                     page.headers.Set("Cache-Control", "no-store");
+                     return page;
+                   },
+                   {.quick = true, .open = true});
+  if (!added) return added;
+  added = server.Route(
+      http::Method::kGet, "/login.css",
+      [](const http::Request&) { return http::Answer(kLoginStyle, "text/css; charset=utf-8"); },
       {.quick = true, .open = true});
   if (!added) return added;
   added = server.Route(http::Method::kPost, "/login",

@@ -29,8 +29,8 @@ class Door {
   /// The answer to a request that may not pass. For http::ServerOptions::gate.
   std::optional<http::Response> Judge(http::Request& request);
 
-  /// GET /login (a page), POST /login (the token as JSON or as a form), GET /session (who it is,
-  /// and the CSRF token), POST /logout.
+  /// GET /login (a page), POST /login (the token as JSON or as a form, which leads to "/"),
+  /// GET /session (who it is, and the CSRF token), POST /logout.
   Status AddRoutes(http::Server& server);
 
  private:

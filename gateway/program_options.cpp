@@ -19,7 +19,11 @@ void ProgramOptions::AddTo(program::Options& options) {
   options.Add("--http-port-file", http_port_file, "file that gets that port");
   options.Add("--origin", origins,
               "web pages of other origins that may use HTTP (https://app.foxglove.dev), * for all");
-  options.Add("--robot", robot, "folder of the robot's description, for Foxglove and ROS 2");
+  options.Add("--robot", robot,
+              "folder of the robot's description, for the web page, Foxglove and ROS 2");
+  options.Add("--scene", scene, "file of the place of work, for the web page");
+  options.Add("--web", web,
+              "folder of the web page; default: where the build or the installation puts it");
   options.Add("--ros2", ros2,
               "be a neighbour of the ROS 2 nodes of the domain: joint states, transforms, objects, "
               "plans (docs/ros2.md)");
@@ -61,11 +65,14 @@ std::vector<rpc::Backend> ProgramOptions::Backends(const program::CommonOptions&
   };
   const bool together = trials.empty() || trials == learning;
   add("learning", learning,
-      together ? std::vector<std::string>{"exemplar.v1.SkillService", "exemplar.v1.TrialService"}
+      together ? std::vector<std::string>{"exemplar.v1.SkillService", "exemplar.v1.TrialService",
+                                          "exemplar.v1.LearningDataService"}
                : std::vector<std::string>{"exemplar.v1.SkillService"});
-  if (!together) add("trials", trials, {"exemplar.v1.TrialService"});
+  if (!together) {
+    add("trials", trials, {"exemplar.v1.TrialService", "exemplar.v1.LearningDataService"});
+  }
   add("executor", executor, {"exemplar.v1.ExecutorService"});
-  add("recorder", recorder, {"exemplar.v1.RecorderService"});
+  add("recorder", recorder, {"exemplar.v1.RecorderService", "exemplar.v1.RecorderDataService"});
   return backends;
 }
 

@@ -20,7 +20,9 @@ struct ProgramOptions {
   std::string http;            ///< HOST:PORT; empty: none
   std::string http_port_file;  ///< gets the port in use
   std::vector<std::string> origins;
-  std::string robot;       ///< folder of the robot, for Foxglove and ROS 2; empty: none
+  std::string robot;       ///< folder of the robot, for drawings and ROS 2; empty: none
+  std::string scene;       ///< file of the place of work, for the web page; empty: none
+  std::string web;         ///< folder of the web page; empty: where it usually is
   std::string recordings;  ///< folder whose recordings Foxglove may play; empty: none
   bool ros2 = false;
   double ros2_rate_hz = 100;

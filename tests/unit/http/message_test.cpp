@@ -80,6 +80,10 @@ TEST(OriginRule, LetsListedPagesAndThoseOfAnAddressIn) {
   EXPECT_FALSE(MayUse(origins, "http://10.0.0.1:80", "10.0.0.1:8765"));
   EXPECT_FALSE(MayUse(origins, "https://app.foxglove.dev.evil.com", "10.0.0.1:8765"));
   EXPECT_FALSE(MayUse(origins, "null", "10.0.0.1:8765"));
+  EXPECT_FALSE(MayUse(origins, "http://lab.example:8080", "lab.example:8080"));
+  EXPECT_TRUE(MayUse(origins, "https://lab.example:8080", "lab.example:8080", true));
+  EXPECT_FALSE(MayUse(origins, "http://lab.example:8080", "lab.example:8080", true));
+  EXPECT_FALSE(MayUse(origins, "https://other.example", "lab.example:8080", true));
   EXPECT_TRUE(MayUse({{"*"}}, "null", "10.0.0.1:8765"));
 }
 

@@ -80,14 +80,14 @@ std::optional<Response> Refuse(Core& core, const RequestHead& head, bool wants_w
 
   const std::string* origin = request.headers.Find("Origin");
   if (origin != nullptr) {
-    if (!MayUse(core.options.origins, *origin, request.headers.Get("Host"))) {
+    if (!MayUse(core.options.origins, *origin, request.headers.Get("Host"), request.tls)) {
       ++core.counters.refused_origins;
       return Plain(403, "pages of " + *origin + " may not use this server");
     }
     decision.extra.Add("Access-Control-Allow-Origin", *origin);
     decision.extra.Add("Vary", "Origin");
   }
-  Routes::Found found = core.routes.Find(request.method, target->segments);
+  Routes::Found found = core.routes.Find(request.method, target->segments, wants_websocket);
   if (request.method == Method::kOptions && found.route == nullptr && !found.methods.empty()) {
     Response preflight{204, {{"Allow", ListOf(found.methods)}}};
     preflight.headers.Add("Access-Control-Allow-Methods", ListOf(found.methods));

@@ -15,13 +15,13 @@ bool IsAddressOrLocal(std::string_view host) {
 
 }  // namespace
 
-bool MayUse(const Origins& origins, std::string_view origin, std::string_view host) {
+bool MayUse(const Origins& origins, std::string_view origin, std::string_view host, bool tls) {
   for (const std::string& allowed : origins.allowed) {
     if (allowed == "*" || allowed == origin) return true;
   }
   const std::size_t scheme = origin.find("://");
-  return scheme != std::string_view::npos && origin.substr(scheme + 3) == host &&
-         IsAddressOrLocal(host);
+  if (scheme == std::string_view::npos || origin.substr(scheme + 3) != host) return false;
+  return IsAddressOrLocal(host) || (tls && origin.starts_with("https://"));
 }
 
 }  // namespace exemplar::http

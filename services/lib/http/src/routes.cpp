@@ -6,7 +6,8 @@ namespace exemplar::http {
 
 Status Routes::Add(RouteEntry route) {
   for (const auto& other : routes_) {
-    if (other->method == route.method && other->pattern.text() == route.pattern.text()) {
+    if (other->method == route.method && other->is_websocket() == route.is_websocket() &&
+        other->pattern.text() == route.pattern.text()) {
       return InvalidArgument("route " + std::string(ToString(route.method)) + " " +
                              route.pattern.text() + " is there already");
     }
@@ -15,7 +16,8 @@ Status Routes::Add(RouteEntry route) {
   return {};
 }
 
-Routes::Found Routes::Find(Method method, const std::vector<std::string>& segments) const {
+Routes::Found Routes::Find(Method method, const std::vector<std::string>& segments,
+                           bool wants_websocket) const {
   if (method == Method::kHead) method = Method::kGet;
   Found found;
   for (const auto& route : routes_) {
@@ -23,7 +25,12 @@ Routes::Found Routes::Find(Method method, const std::vector<std::string>& segmen
     if (!variables) continue;
     found.methods.push_back(route->method);
     if (route->method != method) continue;
-    if (found.route == nullptr || route->pattern.variables() < found.route->pattern.variables()) {
+    const bool is_better = found.route == nullptr ||
+                           route->pattern.variables() < found.route->pattern.variables() ||
+                           (route->pattern.variables() == found.route->pattern.variables() &&
+                            found.route->is_websocket() != wants_websocket &&
+                            route->is_websocket() == wants_websocket);
+    if (is_better) {
       found.route = route.get();
       found.variables = std::move(*variables);
     }

@@ -14,6 +14,8 @@ struct RouteEntry {
   std::variant<Handler, StreamHandler, WebSocketEndpoint> handler;
   /// Of an endpoint: clients there are now.
   std::shared_ptr<std::atomic<std::size_t>> clients;
+
+  bool is_websocket() const { return std::holds_alternative<WebSocketEndpoint>(handler); }
 };
 
 class Routes {
@@ -24,9 +26,11 @@ class Routes {
     std::vector<Method> methods;  ///< that the path has, where this one is not among them
   };
 
+  /// A path may have a page for GET and an endpoint for WebSockets.
   Status Add(RouteEntry route);
-  /// HEAD is answered by GET's handler.
-  Found Find(Method method, const std::vector<std::string>& segments) const;
+  /// HEAD is answered by GET's handler. Where a path has both, `wants_websocket` chooses.
+  Found Find(Method method, const std::vector<std::string>& segments,
+             bool wants_websocket = false) const;
 
  private:
   std::vector<std::unique_ptr<RouteEntry>> routes_;
