@@ -23,6 +23,7 @@
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/security/station.hpp"
+#include "greeting_guard.hpp"
 
 namespace exemplar::bus {
 namespace {
@@ -167,6 +168,10 @@ Status Secure(const ParticipantOptions& options, dds::DomainParticipantQos& qos)
   const Status checked =
       security::CheckMemberFolder(options.security, options.station, SystemClock().Now());
   if (!checked) return checked;
+  if (!GreetingsAreGuarded() && options.log != nullptr) {
+    options.log->Warning("members that start at one moment may never meet",
+                         {{"because", "this Fast DDS does not let their greetings be guarded"}});
+  }
   const security::MemberFiles files = security::FilesOf(options.security);
   const auto set = [&qos](const std::string& name, const std::string& value) {
     qos.properties().properties().emplace_back("dds.sec." + name, value);
