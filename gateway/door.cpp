@@ -197,7 +197,8 @@ Status Door::AddRoutes(http::Server& server) {
                                       "default-src 'none'; style-src 'self'; form-action 'self'; "
                                       "frame-ancestors 'none'; base-uri 'none'");
                      page.headers.Set("X-Content-Type-Options", "nosniff");
-                     page.headers.Set("Referrer-Policy", "no-referrer");
+                     // Without any referrer, browsers would send the form with "Origin: null".
+                     page.headers.Set("Referrer-Policy", "same-origin");
                      page.headers.Set("Cache-Control", "no-store");
                      return page;
                    },

@@ -86,7 +86,7 @@ bool TakesGzip(const http::Request& request) {
 http::Response AnswerPageFile(const StaticFile& file, const http::Request& request) {
   http::Response response = AnswerStaticFile(file, request);
   response.headers.Set("Content-Security-Policy", kPolicy);
-  response.headers.Set("Referrer-Policy", "no-referrer");
+  response.headers.Set("Referrer-Policy", "same-origin");
   response.headers.Set("Cross-Origin-Opener-Policy", "same-origin");
   return response;
 }
