@@ -1,6 +1,7 @@
 #include "command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <map>
 
@@ -245,7 +246,11 @@ Command& Command::Completes(Names names) {
 }
 
 void Command::Runs(std::function<int()> action) {
-  app_->callback([shared = shared_, action = std::move(action)] { shared->chosen = action; });
+  // Of a group: where none of its commands is named.
+  if (!app_->get_subcommands({}).empty()) app_->require_subcommand(0, 1);
+  app_->callback([app = app_, shared = shared_, action = std::move(action)] {
+    if (app->get_subcommands().empty()) shared->chosen = action;
+  });
 }
 
 CommandLine::CommandLine(const std::string& program, const std::string& summary,
@@ -265,8 +270,16 @@ CommandLine::CommandLine(const std::string& program, const std::string& summary,
 CommandLine::~CommandLine() = default;
 
 int CommandLine::Run(int argc, char** argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  // "help skill learn", as other programs have it.
+  if (!words.empty() && words.front() == "help") {
+    words.erase(words.begin());
+    words.push_back("--help");
+  }
+  // CLI11 takes them from the end.
+  std::reverse(words.begin(), words.end());
   try {
-    app_->parse(argc, argv);
+    app_->parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     // --help and --version.
     if (error.get_exit_code() == 0) return app_->exit(error);

@@ -24,6 +24,10 @@ void AddReplayCommand(Command& record);
 /// `watch`: of a gateway, or on the network itself.
 void AddWatchCommand(Command& root, const Session& session);
 void AddDoctorCommand(Command& root, const Session& session);
+/// `backup`, `restore`, `retention`.
+void AddBackupCommands(Command& root, const Session& session);
+/// `person`.
+void AddPersonCommands(Command& root, const Session& session);
 /// `security`: on files of this machine, without a server.
 void AddSecurityCommands(Command& root);
 void AddCompletionCommand(Command& root);

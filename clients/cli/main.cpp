@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
       {"exemplar trial submit --skill press trial-*.csv", "exemplar skill learn press",
        "exemplar skill query press --object button=0.45,-0.2,0.06 --format csv",
        "exemplar skill execute press --object button=0.45,-0.2,0.06 --wait"},
-      "Exit codes: 0 done, 2 bad usage, 3 not found, 4 refused as invalid or unsafe,\n"
+      "Exit codes: 0 done, 2 bad usage, 3 not found, 4 refused as invalid, unsafe or not allowed,\n"
       "5 no service answers, 1 anything else.");
   line.root()
       .Option("--server", "HOST:PORT", session.server,
@@ -42,6 +42,8 @@ int main(int argc, char** argv) {
   cli::AddSkillCommands(line.root(), session);
   cli::AddRobotCommands(line.root(), session);
   cli::AddRecordCommands(line.root(), session);
+  cli::AddPersonCommands(line.root(), session);
+  cli::AddBackupCommands(line.root(), session);
   cli::AddWatchCommand(line.root(), session);
   cli::AddDoctorCommand(line.root(), session);
   cli::AddSecurityCommands(line.root());

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,7 +11,8 @@
 namespace exemplar::cli {
 namespace {
 
-std::string StatusText(const api::RecorderStatus& status) {
+/// The topics' figures count since the recorder started, not since its file began.
+std::string StatusText(const api::RecorderStatus& status, bool with_topics) {
   std::string text = "state     " + status.state +
                      (status.detail.empty() ? "" : " (" + status.detail + ")") + '\n';
   if (!status.file.empty()) {
@@ -31,7 +33,7 @@ std::string StatusText(const api::RecorderStatus& status) {
   if (status.buffered_s > 0) {
     text += "buffered  " + FormatFixed(status.buffered_s, 1) + " s before an event\n";
   }
-  if (status.topics.empty()) return text;
+  if (!with_topics || status.topics.empty()) return text;
   Table topics({"TOPIC", "SENT", "RECEIVED", "LOST", "HZ", "WRITERS", "TYPE"});
   for (const api::TopicFigures& topic : status.topics) {
     topics.Add({topic.topic, std::to_string(topic.sent), std::to_string(topic.received),
@@ -43,7 +45,8 @@ std::string StatusText(const api::RecorderStatus& status) {
 }
 
 int Do(const Session& session, const std::string& format,
-       const std::function<Result<api::RecorderStatus>(api::RecorderApi&)>& action) {
+       const std::function<Result<api::RecorderStatus>(api::RecorderApi&)>& action,
+       bool with_topics = false) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
   const Result<api::RecorderStatus> status = action(*clients->recorder);
@@ -51,9 +54,27 @@ int Do(const Session& session, const std::string& format,
   if (format == "json") {
     Print(ToJson(*status));
   } else {
-    std::cout << StatusText(*status);
+    std::cout << StatusText(*status, with_topics);
   }
   return 0;
+}
+
+/// Begins a file; a topic that nobody writes is answered with the one that may be meant.
+Result<api::RecorderStatus> Start(api::RecorderApi& recorder, const api::RecordStart& start) {
+  Result<api::RecorderStatus> started = recorder.Start(start);
+  if (started || started.error().field != "expected_topics") return started;
+  const Result<api::RecorderStatus> now = recorder.GetStatus();
+  if (!now) return started;
+  std::vector<std::string> names;
+  for (const api::TopicFigures& topic : now->topics) names.push_back(topic.topic);
+  Error error = started.error();
+  for (const std::string& topic : start.expected_topics) {
+    if (std::find(names.begin(), names.end(), topic) != names.end()) continue;
+    if (const auto nearest = NearestName(topic, names)) {
+      error.message += "; did you mean \"" + *nearest + "\"?";
+    }
+  }
+  return error;
 }
 
 }  // namespace
@@ -62,15 +83,16 @@ void AddRecordCommands(Command& root, const Session& session) {
   Command record = root.Add("record", "Recordings of a station's topics, as MCAP files");
 
   struct StartWords {
-    std::string name, format;
+    std::string name, person, format;
     std::vector<std::string> metadata, topics;
     std::optional<double> wait_s, split_s, split_mb;
   };
   const auto words = std::make_shared<StartWords>();
   Command command = record.Add("start", "Begins a file",
-                               {"exemplar record start --name trial-001 --meta person=anna",
+                               {"exemplar record start --name trial-001 --person user03",
                                 "exemplar record start --topic ircp/suit --topic ircp/objects"});
   command.Option("--name", "NAME", words->name, "of the file (default: made from the time)");
+  command.Option("--person", "ID", words->person, "whose demonstration it is: a pseudonymous id");
   command.Option("--meta", "NAME=VALUE", words->metadata, "kept in the file; several times");
   command.Option("--topic", "TOPIC", words->topics, "wait until it has a writer; several times");
   command.Option("--wait", "SECONDS", words->wait_s, "limit of that wait (default: 5)");
@@ -83,6 +105,7 @@ void AddRecordCommands(Command& root, const Session& session) {
     api::RecordStart start;
     start.name = words->name;
     start.metadata = *metadata;
+    if (!words->person.empty()) start.metadata["person"] = words->person;
     start.expected_topics = words->topics;
     if (words->wait_s) start.timeout_s = *words->wait_s;
     if (words->split_s) start.split_s = *words->split_s;
@@ -96,11 +119,11 @@ void AddRecordCommands(Command& root, const Session& session) {
       start.split_bytes = static_cast<std::uint64_t>(1e6 * *words->split_mb);
     }
     return Do(session, words->format,
-              [&](api::RecorderApi& recorder) { return recorder.Start(start); });
+              [&](api::RecorderApi& recorder) { return Start(recorder, start); });
   });
 
   struct EventWords {
-    std::string note, name, format;
+    std::string note, name, person, format;
     std::vector<std::string> metadata;
   };
   const auto event = std::make_shared<EventWords>();
@@ -111,6 +134,7 @@ void AddRecordCommands(Command& root, const Session& session) {
                         "exemplar record event --name fault-7"});
   command.Option("--note", "TEXT", event->note, "what happened");
   command.Option("--name", "NAME", event->name, "of a file that begins (default: from the time)");
+  command.Option("--person", "ID", event->person, "kept in such a file: whose demonstration it is");
   command.Option("--meta", "NAME=VALUE", event->metadata, "kept in such a file; several times");
   AddFormat(command, event->format, {"text", "json"});
   command.Runs([&session, event] {
@@ -120,6 +144,7 @@ void AddRecordCommands(Command& root, const Session& session) {
     request.note = event->note;
     request.name = event->name;
     request.metadata = *metadata;
+    if (!event->person.empty()) request.metadata["person"] = event->person;
     return Do(session, event->format,
               [&](api::RecorderApi& recorder) { return recorder.MarkEvent(request); });
   });
@@ -141,8 +166,9 @@ void AddRecordCommands(Command& root, const Session& session) {
         record.Add(action.name, action.summary, {std::string("exemplar record ") + action.name});
     AddFormat(command, *format, {"text", "json"});
     command.Runs([&session, format, call = action.call] {
-      return Do(session, *format,
-                [call](api::RecorderApi& recorder) { return (recorder.*call)(); });
+      return Do(
+          session, *format, [call](api::RecorderApi& recorder) { return (recorder.*call)(); },
+          call == &api::RecorderApi::GetStatus);
     });
   }
   AddRecordingFileCommands(record);

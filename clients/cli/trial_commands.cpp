@@ -12,7 +12,7 @@ namespace exemplar::cli {
 namespace {
 
 struct SubmitWords {
-  std::string skill;
+  std::string skill, person;
   std::vector<std::string> files;
   std::string format;
 };
@@ -26,13 +26,17 @@ int Submit(const Session& session, const SubmitWords& words) {
   for (const std::string& path : words.files) {
     Result<std::string> file = ReadFile(path);
     const Result<api::SubmitResult> result =
-        file ? clients->trials->Submit(words.skill, FileName(path), *std::move(file))
+        file ? clients->trials->Submit(words.skill, FileName(path), *std::move(file), words.person)
              : Result<api::SubmitResult>(file.error());
     if (!result) {
       const int failed = Fail(result.error());
       if (code == 0) code = failed;
       // The others would fail alike.
-      if (result.error().code == ErrorCode::kUnavailable) break;
+      const ErrorCode why = result.error().code;
+      if (why == ErrorCode::kUnavailable || why == ErrorCode::kUnauthenticated ||
+          why == ErrorCode::kPermissionDenied) {
+        break;
+      }
       continue;
     }
     if (words.format == "json") {
@@ -50,10 +54,11 @@ int Submit(const Session& session, const SubmitWords& words) {
   return code;
 }
 
-int List(const Session& session, const std::string& skill, const std::string& format) {
+int List(const Session& session, const std::string& skill, const std::string& person,
+         const std::string& format) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
-  const Result<std::vector<api::TrialInfo>> trials = clients->trials->List(skill);
+  const Result<std::vector<api::TrialInfo>> trials = clients->trials->List(skill, person);
   if (!trials) return Fail(trials.error());
   if (format == "json") {
     nlohmann::json list = nlohmann::json::array();
@@ -61,10 +66,12 @@ int List(const Session& session, const std::string& skill, const std::string& fo
     Print(list);
     return 0;
   }
-  Table table({"TRIAL", "SKILL", "SECONDS", "SAMPLES", "NOTICES", "SUBMITTED", "SOURCE"});
+  if (trials->empty()) Hint("no trials yet: `exemplar trial submit --skill NAME FILE...`");
+  Table table({"TRIAL", "SKILL", "PERSON", "SECONDS", "SAMPLES", "NOTICES", "SUBMITTED", "SOURCE"});
   for (const api::TrialInfo& info : *trials) {
-    table.Add({info.id, info.skill, FormatFixed(info.duration_s, 2), std::to_string(info.samples),
-               std::to_string(info.notices.size()), TimeText(info.submitted), info.source});
+    table.Add({info.id, info.skill, info.person, FormatFixed(info.duration_s, 2),
+               std::to_string(info.samples), std::to_string(info.notices.size()),
+               TimeText(info.submitted), info.source});
   }
   std::cout << table.Text();
   return 0;
@@ -80,7 +87,8 @@ int Show(const Session& session, const std::string& id, const std::string& forma
     return 0;
   }
   std::cout << "trial      " << info->id << "\nskill      " << info->skill << "\nsource     "
-            << info->source << "\nsubmitted  " << TimeText(info->submitted) << "\nduration   "
+            << info->source << "\nperson     " << (info->person.empty() ? "unknown" : info->person)
+            << "\nsubmitted  " << TimeText(info->submitted) << "\nduration   "
             << FormatFixed(info->duration_s, 3) << " s\nsamples    " << info->samples
             << "\nstreams    " << Join(info->streams, ", ") << '\n';
   for (const std::string& notice : info->notices) std::cout << "notice     " << notice << '\n';
@@ -132,9 +140,9 @@ int Segments(const Session& session, const SegmentsWords& words) {
     std::cout << csv;
     return 0;
   }
-  std::cout << "c = " << FormatDouble(found.c) << (found.c_replaced ? " (from the data)" : "")
-            << ", k = " << FormatDouble(found.k)
-            << ", c_tactile = " << FormatDouble(found.c_tactile) << '\n';
+  std::cout << "c = " << FormatFixed(found.c, 6) << (found.c_replaced ? " (from the data)" : "")
+            << ", k = " << FormatFixed(found.k, 2)
+            << ", c_tactile = " << FormatFixed(found.c_tactile, 6) << '\n';
   Table table({"SECONDS", "KIND", "CAUSE", "SCORE"});
   for (const learning::Marker& marker : found.markers) {
     table.Add(
@@ -154,17 +162,29 @@ int Export(const Session& session, const std::string& id, const std::string& out
 }
 
 /// All are tried; the exit code is that of the first that failed.
-int Delete(const Session& session, const std::vector<std::string>& ids) {
+int Delete(const Session& session, const std::vector<std::string>& ids, const std::string& format) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
   int code = 0;
+  std::vector<std::string> deleted;
   for (const std::string& id : ids) {
-    const Status deleted = clients->trials->Delete(id);
-    if (deleted) continue;
-    const int failed = Fail(deleted.error());
-    if (code == 0) code = failed;
+    if (const Status done = clients->trials->Delete(id); !done) {
+      const int failed = Fail(done.error());
+      if (code == 0) code = failed;
+      continue;
+    }
+    deleted.push_back(id);
+    if (format != "json") std::cout << id << " is deleted\n";
   }
+  if (format == "json") Print({{"deleted", deleted}});
   return code;
+}
+
+int SetPerson(const Session& session, const std::string& id, const std::string& person) {
+  const Result<rpc::Clients> clients = session.Connect();
+  if (!clients) return FailUsage(clients.error());
+  const Status set = clients->trials->SetPerson(id, person);
+  return set ? 0 : Fail(set.error());
 }
 
 }  // namespace
@@ -187,20 +207,23 @@ void AddTrialCommands(Command& root, const Session& session) {
   command.Option("--skill", "NAME", submit->skill, "the skill that the trials show")
       .Required()
       .Completes(Names::kSkills);
+  command.Option("--person", "ID", submit->person,
+                 "whose demonstrations they are (default: as a recording says)");
   command.Arguments("FILE", submit->files, "CSV or MCAP");
   AddFormat(command, submit->format, {"text", "json"});
   command.Runs([&session, submit] { return Submit(session, *submit); });
 
   struct Words {
-    std::string name, format, output;
+    std::string name, person, format, output;
     std::vector<std::string> names;
   };
   const auto list = std::make_shared<Words>();
   command = trial.Add("list", "Lists the trials of a skill, or of all",
-                      {"exemplar trial list --skill press"});
+                      {"exemplar trial list --skill press", "exemplar trial list --person user03"});
   command.Option("--skill", "NAME", list->name, "only this skill's").Completes(Names::kSkills);
+  command.Option("--person", "ID", list->person, "only this person's");
   AddFormat(command, list->format, {"text", "json"});
-  command.Runs([&session, list] { return List(session, list->name, list->format); });
+  command.Runs([&session, list] { return List(session, list->name, list->person, list->format); });
 
   const auto show = std::make_shared<Words>();
   command = trial.Add("show", "Shows what one trial holds and what was mended in it",
@@ -234,7 +257,18 @@ void AddTrialCommands(Command& root, const Session& session) {
       "delete", "Deletes trials. Skills learned from them stay as they are until learned anew",
       {"exemplar trial delete trial-0f3c5a7be1d20496"});
   command.Arguments("ID", deleted->names, "as submit printed them");
-  command.Runs([&session, deleted] { return Delete(session, deleted->names); });
+  AddFormat(command, deleted->format, {"text", "json"});
+  command.Runs([&session, deleted] { return Delete(session, deleted->names, deleted->format); });
+
+  const auto owned = std::make_shared<Words>();
+  command = trial.Add(
+      "set-person",
+      "Says whose demonstration a trial is: a stored one, or one that a skill was learned from",
+      {"exemplar trial set-person trial-0f3c5a7be1d20496 user03",
+       "exemplar trial set-person trial-0f3c5a7be1d20496"});
+  command.Argument("ID", owned->name, "as submit printed it");
+  command.OptionalArgument("PERSON", owned->person, "a pseudonymous id; none: unknown");
+  command.Runs([&session, owned] { return SetPerson(session, owned->name, owned->person); });
 }
 
 }  // namespace exemplar::cli

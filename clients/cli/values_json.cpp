@@ -83,7 +83,8 @@ json ToJson(const api::TrialInfo& info) {
           {"duration_s", info.duration_s},
           {"samples", info.samples},
           {"streams", info.streams},
-          {"notices", info.notices}};
+          {"notices", info.notices},
+          {"person", info.person}};
 }
 
 json ToJson(const api::TrialSegments& segments) {
