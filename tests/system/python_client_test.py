@@ -29,7 +29,7 @@ def main():
         else:
             print("with packages from PyPI", flush=True)
             run(sys.executable, "-m", "venv", python.parents[1])
-            if pip(python, python, "pytest").returncode != 0:
+            if pip(python, python, "pytest", "mypy", "types-grpcio").returncode != 0:
                 print("SKIPPED: PyPI cannot be reached, and Debian's packages are not installed", flush=True)
                 return SKIPPED
             pip(python, python, CLIENT).check_returncode()

@@ -2,9 +2,10 @@
 
 import pathlib
 import socket
+import subprocess
 import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypedDict
 
 import pytest
 
@@ -29,6 +30,10 @@ class Station:
 
     def __init__(self, folder: pathlib.Path) -> None:
         self.programs: Any = processes.Programs(folder, DOMAIN)
+        self.scene = SCENE
+        # The simulated time waits for the executor: how busy the machine is does not matter.
+        self.simulator_words = ["--in-step-with", "executor"]
+        self.executor_words = ["--clock", "network"]
         self._addresses: dict[str, str] = {}
 
     def learning(self) -> str:
@@ -39,8 +44,9 @@ class Station:
 
     def executor(self) -> str:
         if "executor" not in self._addresses:
-            self.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", SCENE, "--cameras", "off")
-            address = self._server("executor", "--robot", ROBOT, "--scene", SCENE, "--learning", self.learning())
+            shared = ["--robot", ROBOT, "--scene", self.scene]
+            self.programs.start("exemplar-simulator", *shared, "--cameras", "off", *self.simulator_words)
+            address = self._server("executor", *shared, "--learning", self.learning(), *self.executor_words)
             with exemplar.Client(address) as client:
                 processes.wait_for(lambda: len(client.robot.status().joints) > 0, "the robot's joint state")
         return self._addresses["executor"]
@@ -54,6 +60,109 @@ class Station:
             assert process.poll() is None, self.programs.logs()
             self._addresses[name] = f"127.0.0.1:{port.read_text().strip()}"
         return self._addresses[name]
+
+
+class Shown(TypedDict, total=False):
+    """What a client shows, and whom it believes."""
+
+    tls_ca: str
+    tls_cert: str
+    tls_key: str
+    token: str
+
+
+def security(command: str, folder: pathlib.Path, *words: object) -> str:
+    """Runs `exemplar security`."""
+    line = [processes.BINARIES / "exemplar", "security", command, folder, *words]
+    return subprocess.run([str(word) for word in line], capture_output=True, text=True, check=True).stdout
+
+
+class SecuredStation:
+    """A learning service that wants certificates of its callers, and a gateway before it that takes tokens."""
+
+    def __init__(self, folder: pathlib.Path) -> None:
+        self.files = folder / "station"
+        self.programs: Any = processes.Programs(folder, DOMAIN + 1)
+        security("init", self.files, "--station", "test")
+        for name, *words in (
+            ("learning", "--role", "learning"),
+            ("gateway", "--role", "gateway"),
+            ("anna", "--role", "person", "--call", "teach"),
+            ("otto", "--role", "person", "--call", "observe"),
+        ):
+            security("issue", self.files, name, *words)
+        self.token = security("token", self.files, "ben", "--role", "observe").strip()
+        access = ["--access", self.files / "access.yaml"]
+        own_ca = ["--tls-client-ca", self.ca]
+        self.learning = self._start("learning", "--data-dir", folder / "learning", *access, *own_ca, bus=False)
+        self.gateway = self._start("gateway", "--learning", self.learning, "--tls-ca", self.ca, *access)
+
+    @property
+    def ca(self) -> str:
+        return str(self.files / "members" / "anna" / "ca.pem")
+
+    def certificate(self, name: str) -> Shown:
+        """What a client shows that has a certificate."""
+        member = self.files / "members" / name
+        return {"tls_ca": self.ca, "tls_cert": str(member / "cert.pem"), "tls_key": str(member / "key.pem")}
+
+    def _start(self, name: str, *words: object, bus: bool = True) -> str:
+        member = self.files / "members" / name
+        port = self.programs.folder / f"{name}.port"
+        tls = ["--tls-cert", member / "cert.pem", "--tls-key", member / "key.pem"]
+        listen = ["--listen", "127.0.0.1:0", "--port-file", port]
+        process = self.programs.start(f"exemplar-{name}", *words, *tls, *listen, bus=bus)
+        processes.wait_for(lambda: process.poll() is not None or port.exists(), f"the port of {name}")
+        assert process.poll() is None, self.programs.logs()
+        return f"127.0.0.1:{port.read_text().strip()}"
+
+
+class MovingStation(Station):
+    """One whose button runs along a rail, and is tracked."""
+
+    def __init__(self, folder: pathlib.Path, learning: str) -> None:
+        super().__init__(folder)
+        self.programs = processes.Programs(folder, DOMAIN + 2)
+        self._addresses["learning"] = learning
+        self.scene = folder / "scene.yaml"
+        text = SCENE.read_text().partition("cameras:")[0]
+        rail = "    rail: {direction: [0, 1, 0], length: 0.4, speed: 0.01}\n"
+        self.scene.write_text(text + rail)
+        self.simulator_words += ["--track-hz", "60"]
+
+
+class TeleoperatedStation(Station):
+    """One whose robot follows a suit, which knows no simulated time."""
+
+    def __init__(self, folder: pathlib.Path, learning: str) -> None:
+        super().__init__(folder)
+        self.programs = processes.Programs(folder, DOMAIN + 2)
+        self._addresses["learning"] = learning
+        self.simulator_words = []
+        # A busy machine is no fault of the robot's.
+        self.executor_words = ["--state-patience-s", "2", "--command-patience-s", "2"]
+        self.executor_words += ["--suit-patience-s", "0.5", "--dead-man-patience-s", "0.6"]
+
+
+@pytest.fixture(scope="module")
+def teleoperated(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Iterator[TeleoperatedStation]:
+    running = TeleoperatedStation(tmp_path_factory.mktemp("teleoperated"), station.learning())
+    yield running
+    running.programs.end()
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory, station: Station) -> Iterator[MovingStation]:
+    running = MovingStation(tmp_path_factory.mktemp("moving"), station.learning())
+    yield running
+    running.programs.end()
+
+
+@pytest.fixture(scope="session")
+def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SecuredStation]:
+    running = SecuredStation(tmp_path_factory.mktemp("secured"))
+    yield running
+    running.programs.end()
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ import pytest
 import exemplar
 from conftest import BUTTON, Station
 
-NAMESPACES = ("trials", "skills", "robot", "recorder")
+NAMESPACES = ("trials", "skills", "robot", "recorder", "topics", "learning_data", "recorder_data")
 
 
 def public(of: object) -> dict[str, Callable[..., Any]]:

@@ -4,6 +4,7 @@ import io
 import json
 import pathlib
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ def test_a_trial_comes_back_as_it_was_submitted(client: exemplar.Client, files: 
     assert tool.quaternions is not None
     assert tool.quaternions.shape == (len(tool.time_s), 4)
 
-    table = np.genfromtxt(io.BytesIO(client.trials.export(info.id)), delimiter=",", names=True)
+    table: Any = np.genfromtxt(io.BytesIO(client.trials.export(info.id)), delimiter=",", names=True)
     np.testing.assert_allclose(table["ee_x_m"], expected.positions[:, 0], atol=1e-9)
 
     client.trials.delete(info.id)

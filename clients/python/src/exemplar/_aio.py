@@ -10,11 +10,11 @@ from typing import Any, Generic, TypeVar
 import grpc
 import grpc.aio
 
-from . import _calls
+from . import _calls, _data
 from ._connection import CHANNEL_OPTIONS, Arrivals, Outcome, QueryStream, Settings, closed
 from ._errors import CancelledError, ExemplarError, from_rpc
 from ._pose import Objects, PoseLike
-from ._values import Motion, TopicBatch, TopicInfo, TopicSample
+from ._values import DataReport, Motion, TopicBatch, TopicInfo, TopicSample
 from ._wire import Message, Method
 
 T = TypeVar("T")
@@ -224,6 +224,18 @@ class AsyncLink:
         """Begins."""
         stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
         return AsyncOperation(call, stream, self.settings.address(call.method))
+
+    async def copy(self, call: _data.Copy, timeout: float | None = None) -> None:
+        """Into the backup's file."""
+        stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
+        with _errors_of(self.settings.address(call.method)):
+            async for message in stream:
+                call.take(message)
+
+    async def restore(self, call: _data.Restoration, timeout: float | None = None) -> DataReport:
+        """Answers once all is sent and taken over."""
+        invoke = self.channel(call.method).stream_unary(call.method.path, **call.method.codec())
+        return call.read(await self._wait(call.method, invoke, call.requests(), timeout, True))
 
     def subscribe(self, call: _calls.Stream[TopicBatch], timeout: float | None = None) -> AsyncSubscription:
         """Begins."""

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from collections.abc import Mapping, Sequence
 
-from . import _calls
+from . import _calls, _data
 from ._aio import AsyncLink, AsyncMotionStream, AsyncOperation, AsyncSubscription
 from ._calls import Content, JointStart, Options, Sample, TrialFile
 from ._connection import Credentials, QueryStream, Settings
+from ._data import BackupFile, BackupWriter, RestoreMode
 from ._pose import Objects, PoseLike
 from ._trial import Trial
 from ._values import (
+    DataReport,
     Evaluation,
     ExecutionResult,
     Feedback,
     Motion,
+    PersonInfo,
     Plan,
     Progress,
     RecorderStatus,
@@ -26,6 +30,8 @@ from ._values import (
     SkillVersion,
     Submission,
     Suggestions,
+    TeleoperationFeedback,
+    TeleoperationResult,
     TopicInfo,
     TrialInfo,
 )
@@ -37,9 +43,9 @@ class AsyncClient:
     server: HOST:PORT that serves everything; without it, the environment variable EXEMPLAR_SERVER, then
     127.0.0.1:50051. learning, executor, recorder: addresses of single services that are elsewhere. timeout: limit of
     each call in seconds, None for none; learning, planning and executing have none. Every call takes a `timeout` of
-    its own (math.inf: none). tls_ca: PEM file of the CA of the servers, which turns TLS on; tls_cert, tls_key: PEM files
-    of your own; token: sent with each call, "@FILE" reads a file. Without them, EXEMPLAR_TLS_CA, EXEMPLAR_TLS_CERT,
-    EXEMPLAR_TLS_KEY and EXEMPLAR_TOKEN.
+    its own (math.inf: none). tls_ca: PEM file of the CA of the servers, which turns TLS on; tls_cert, tls_key: PEM
+    files of your own; token: sent with each call, "@FILE" reads a file. Without them, EXEMPLAR_TLS_CA,
+    EXEMPLAR_TLS_CERT, EXEMPLAR_TLS_KEY and EXEMPLAR_TOKEN.
 
     Errors are exceptions derived from ExemplarError, with code, message and field. Nothing is connected before the
     first call. Belongs to one event loop. Use it as an asynchronous context manager, or await close().
@@ -65,6 +71,8 @@ class AsyncClient:
         self.robot = AsyncRobot(self._link)
         self.recorder = AsyncRecorder(self._link)
         self.topics = AsyncTopics(self._link)
+        self.learning_data = AsyncData(self._link, _data.LEARNING)
+        self.recorder_data = AsyncData(self._link, _data.RECORDER)
 
     def skill(self, name: str, version: int = 0) -> AsyncSkill:
         """One skill by name, without asking whether it is there. version: 0 for the current one."""
@@ -87,13 +95,18 @@ class AsyncTrials:
     def __init__(self, link: AsyncLink) -> None:
         self._link = link
 
-    async def submit(self, skill: str, trial: TrialFile, *, timeout: float | None = None) -> Submission:
-        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it is safe."""
-        return await self._link.upload(_calls.submit(skill, trial), timeout)
+    async def submit(
+        self, skill: str, trial: TrialFile, *, person: str = "", timeout: float | None = None
+    ) -> Submission:
+        """Stores a trial for a skill: the path of a CSV or MCAP file, or a Trial. Once answered, it is safe.
 
-    async def list(self, skill: str = "", *, timeout: float | None = None) -> tuple[TrialInfo, ...]:
-        """The trials of a skill in the order of submission; "": of all skills."""
-        return await self._link.unary(_calls.list_trials(skill), timeout)
+        person: whose demonstration it is, a pseudonymous id; "": as the recording says.
+        """
+        return await self._link.upload(_calls.submit(skill, trial, person), timeout)
+
+    async def list(self, skill: str = "", *, person: str = "", timeout: float | None = None) -> tuple[TrialInfo, ...]:
+        """The trials of a skill in the order of submission; "": of all skills, of everybody."""
+        return await self._link.unary(_calls.list_trials(skill, person), timeout)
 
     async def get(self, trial_id: str, *, timeout: float | None = None) -> TrialInfo:
         """What is known of one trial."""
@@ -122,6 +135,10 @@ class AsyncTrials:
     async def delete(self, trial_id: str, *, timeout: float | None = None) -> None:
         """Removes a trial; skills that were learned from it stay as they are."""
         return await self._link.unary(_calls.delete_trial(trial_id), timeout)
+
+    async def set_person(self, trial_id: str, person: str, *, timeout: float | None = None) -> None:
+        """Says whose demonstration a trial is ("": unknown): a stored one, or one that a skill was learned from."""
+        return await self._link.unary(_calls.set_person(trial_id, person), timeout)
 
 
 class AsyncSkills:
@@ -208,11 +225,16 @@ class AsyncRobot:
         *,
         speed: float = 1.0,
         start: PoseLike | None = None,
+        follow: bool = False,
         version: int = 0,
         timeout: float | None = None,
     ) -> Plan:
-        """Everything but the motion. Raises FailedPreconditionError when it is unsafe or out of reach."""
-        return await self._link.unary(_calls.plan(skill, objects, speed, start, version), timeout)
+        """Everything but the motion. Raises FailedPreconditionError when it is unsafe or out of reach.
+
+        follow: for a target that moves, as it does now.
+        """
+        call = _calls.plan(skill, objects, speed, start, follow, version)
+        return await self._link.unary(call, timeout)
 
     def execute(
         self,
@@ -221,18 +243,19 @@ class AsyncRobot:
         *,
         speed: float = 1.0,
         start: PoseLike | None = None,
+        follow: bool = False,
         detached: bool = False,
         version: int = 0,
         timeout: float | None = None,
     ) -> AsyncOperation[Feedback, ExecutionResult]:
         """Plans and moves; feedback about ten times a second.
 
-        objects: None for where they are seen now. speed: over 0, at most 1. start: tool pose to go to first. Cancelling
-        the call slows the robot down and holds it. detached: the result comes once the robot moves, and the end of the
-        call does not end the motion. A motion that was aborted is a result (`result.done` is false), one that was
-        refused is an exception.
+        objects: None for where they are seen now. speed: over 0, at most 1. start: tool pose to go to first. follow:
+        the target moves, and is met where it will be; without `objects`. Cancelling the call slows the robot down and
+        holds it. detached: the result comes once the robot moves, and the end of the call does not end the motion. A
+        motion that was aborted is a result (`result.done` is false), one that was refused is an exception.
         """
-        call = _calls.execute(skill, objects, speed, start, detached, version)
+        call = _calls.execute(skill, objects, speed, start, follow, detached, version)
         return self._link.long(call, timeout)
 
     async def status(self, *, timeout: float | None = None) -> RobotStatus:
@@ -262,6 +285,21 @@ class AsyncRobot:
     async def set_speed(self, factor: float, *, timeout: float | None = None) -> None:
         """Scales the speed of this and later motions; over 0, at most 1."""
         return await self._link.unary(_calls.set_speed(factor), timeout)
+
+    def teleoperate(
+        self, *, suit: str = "", touch: Sequence[str] = (), detached: bool = False, timeout: float | None = None
+    ) -> AsyncOperation[TeleoperationFeedback, TeleoperationResult]:
+        """Lets the robot follow the suit while the dead-man is held; feedback about ten times a second.
+
+        suit: source of ircp/suit ("": the first that is heard). touch: objects of the scene that the robot's touch
+        links may touch. Cancelling the call holds the robot and ends it; end_teleoperation() ends it with a result.
+        detached: the result comes once the mode is on, which then lasts until end_teleoperation().
+        """
+        return self._link.long(_calls.teleoperate(suit, touch, detached), timeout)
+
+    async def end_teleoperation(self, *, timeout: float | None = None) -> None:
+        """Ends teleoperation, whoever began it; the robot holds."""
+        return await self._link.unary(_calls.end_teleoperation(), timeout)
 
 
 class AsyncRecorder:
@@ -318,6 +356,69 @@ class AsyncRecorder:
         return await self._link.unary(_calls.recorder("GetStatus"), timeout)
 
 
+class AsyncData:
+    """What operators do with all that a service keeps: `client.learning_data` trials and skills,
+    `client.recorder_data` recordings. All but persons() take the role "administer".
+    """
+
+    def __init__(self, link: AsyncLink, service: str) -> None:
+        self._link = link
+        self._service = service
+
+    async def persons(self, *, timeout: float | None = None) -> tuple[PersonInfo, ...]:
+        """Whose trials or recordings there are."""
+        return await self._link.unary(_data.list_persons(self._service), timeout)
+
+    def erase(
+        self, person: str, *, dry_run: bool = False, timeout: float | None = None
+    ) -> AsyncOperation[Progress, DataReport]:
+        """Takes out everything of one person, and what was learned from it. dry_run: only says what would be done.
+
+        What an erasure that broke off has done stays done; the next one finishes it.
+        """
+        return self._link.long(_data.erase_person(self._service, person, dry_run), timeout)
+
+    async def apply_retention(
+        self,
+        *,
+        dry_run: bool = False,
+        keep_days: float | None = None,
+        keep_versions_days: float | None = None,
+        needed_too: bool = False,
+        timeout: float | None = None,
+    ) -> DataReport:
+        """Takes out what is too old. keep_days, keep_versions_days: in place of the service's own settings; 0: never.
+
+        needed_too: trials that a current skill version was learned from go as well.
+        """
+        call = _data.apply_retention(self._service, dry_run, keep_days, keep_versions_days, needed_too)
+        return await self._link.unary(call, timeout)
+
+    async def backup(self, writer: BackupWriter, *, timeout: float | None = None) -> None:
+        """Copies the service's data, while it goes on, into a file that may hold that of others as well.
+
+        with exemplar.BackupWriter("station.tar") as writer:
+            client.learning_data.backup(writer)
+        """
+        return await self._link.copy(_data.backup(self._service, writer), timeout)
+
+    async def restore(
+        self,
+        file: BackupFile,
+        *,
+        mode: RestoreMode = "empty_only",
+        erased_in: BackupFile | None = None,
+        timeout: float | None = None,
+    ) -> DataReport:
+        """Puts the service's part of a backup back; all or nothing.
+
+        People who were erased after their data came are left out: those whom the service, the backup, or a newer
+        backup (erased_in) know.
+        """
+        call = await asyncio.to_thread(_data.restore, self._service, file, mode, erased_in)
+        return await self._link.restore(call, timeout)
+
+
 class AsyncTopics:
     """A station's topics, through the gateway (`server`)."""
 
@@ -346,7 +447,13 @@ class AsyncTopics:
         return self._link.subscribe(_calls.subscribe(topics, max_rate_hz, queue, content, last), timeout)
 
     async def publish(
-        self, topic: str, sample: Sample, *, type: str = "", schema: str = "", timeout: float | None = None
+        self,
+        topic: str,
+        sample: Sample,
+        *,
+        type: str = "",  # noqa: A002
+        schema: str = "",
+        timeout: float | None = None,
     ) -> None:
         """Sends one sample: its members by name, or its bytes. `type` and `schema` where nobody has told them.
 
@@ -402,10 +509,13 @@ class AsyncSkill:
         *,
         speed: float = 1.0,
         start: PoseLike | None = None,
+        follow: bool = False,
     ) -> AsyncOperation[Feedback, ExecutionResult]:
         """Carries it out; as `client.robot.execute`."""
         named = None if objects is None else await self._named(objects)
-        return self._client.robot.execute(self.name, named, speed=speed, start=start, version=self.version)
+        return self._client.robot.execute(
+            self.name, named, speed=speed, start=start, follow=follow, version=self.version
+        )
 
     async def _named(self, objects: Objects | PoseLike) -> Objects:
         if isinstance(objects, Mapping):

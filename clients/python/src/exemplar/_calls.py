@@ -34,6 +34,8 @@ from ._values import (
     SkillVersion,
     Submission,
     Suggestions,
+    TeleoperationFeedback,
+    TeleoperationResult,
     TopicBatch,
     TopicInfo,
     TrialInfo,
@@ -167,10 +169,14 @@ def query(objects: Objects, start: PoseLike | None, joint_start: JointStart | No
     return message
 
 
-def execution(name: str, objects: Objects | None, speed: float, start: PoseLike | None, version: int) -> Message:
+def execution(
+    name: str, objects: Objects | None, speed: float, start: PoseLike | None, follow: bool, version: int
+) -> Message:
     """A SkillExecution."""
+    if follow and objects:
+        raise InvalidArgumentError("follow takes the target where it is seen: leave objects away", "objects")
     message = message_class("SkillExecution")(
-        skill=skill(name, version), objects=named_poses(objects or {}), speed=speed
+        skill=skill(name, version), objects=named_poses(objects or {}), speed=speed, follow=follow
     )
     if start is not None:
         message.start.MergeFrom(pose(start, "start"))
@@ -204,14 +210,16 @@ def limit_s(client: float | None, call: float | None, long: bool) -> float | Non
 # ---- TrialService ----
 
 
-def submit(name: str, trial: TrialFile) -> Upload[Submission]:
+def submit(name: str, trial: TrialFile, person: str) -> Upload[Submission]:
     source, data = trial_bytes(trial)
-    header = {"skill": name, "name": source}
+    header = {"skill": name, "name": source, "person": person}
     return Upload(method("TrialService/Submit"), header, data, _read.submission)
 
 
-def list_trials(name: str) -> Unary[tuple[TrialInfo, ...]]:
-    return _unary("TrialService/List", lambda m: tuple(_read.trial_info(x) for x in m.trials), skill=name)
+def list_trials(name: str, person: str) -> Unary[tuple[TrialInfo, ...]]:
+    return _unary(
+        "TrialService/List", lambda m: tuple(_read.trial_info(x) for x in m.trials), skill=name, person=person
+    )
 
 
 def get_trial(trial_id: str) -> Unary[TrialInfo]:
@@ -240,6 +248,10 @@ def export_trial(trial_id: str) -> Download:
 
 def delete_trial(trial_id: str) -> Unary[None]:
     return _unary("TrialService/Delete", _nothing, id=trial_id)
+
+
+def set_person(trial_id: str, person: str) -> Unary[None]:
+    return _unary("TrialService/SetPerson", _nothing, id=trial_id, person=person)
 
 
 # ---- SkillService ----
@@ -308,12 +320,14 @@ def export_skill(name: str, version: int) -> Download:
 # ---- ExecutorService ----
 
 
-def plan(name: str, objects: Objects | None, speed: float, start: PoseLike | None, version: int) -> Unary[Plan]:
+def plan(
+    name: str, objects: Objects | None, speed: float, start: PoseLike | None, follow: bool, version: int
+) -> Unary[Plan]:
     return _unary(
         "ExecutorService/Plan",
         lambda m: _read.plan(m.plan),
         True,
-        execution=execution(name, objects, speed, start, version),
+        execution=execution(name, objects, speed, start, follow, version),
     )
 
 
@@ -322,11 +336,12 @@ def execute(
     objects: Objects | None,
     speed: float,
     start: PoseLike | None,
+    follow: bool,
     detached: bool,
     version: int,
 ) -> Long[Feedback, ExecutionResult]:
     found = method("ExecutorService/Execute")
-    request = found.request(execution=execution(name, objects, speed, start, version), detached=detached)
+    request = found.request(execution=execution(name, objects, speed, start, follow, version), detached=detached)
     return Long(found, request, "feedback", _read.feedback, "result", _read.execution_result)
 
 
@@ -341,6 +356,16 @@ def robot(name: str) -> Unary[None]:
 
 def set_speed(factor: float) -> Unary[None]:
     return _unary("ExecutorService/SetSpeed", _nothing, factor=factor)
+
+
+def teleoperate(suit: str, touch: Sequence[str], detached: bool) -> Long[TeleoperationFeedback, TeleoperationResult]:
+    found = method("ExecutorService/Teleoperate")
+    request = found.request(suit=suit, touch=list(touch), detached=detached)
+    return Long(found, request, "feedback", _read.teleoperation_feedback, "result", _read.teleoperation_result)
+
+
+def end_teleoperation() -> Unary[None]:
+    return _unary("ExecutorService/EndTeleoperation", _nothing)
 
 
 # ---- RecorderService ----
@@ -390,12 +415,12 @@ def _plain(value: Any) -> Any:
 
 
 def list_topics(topics: Sequence[str]) -> Unary[tuple[TopicInfo, ...]]:
-    return _unary(
-        "TopicService/List", lambda m: tuple(_read.topic_info(x) for x in m.topics), topics=list(topics)
-    )
+    return _unary("TopicService/List", lambda m: tuple(_read.topic_info(x) for x in m.topics), topics=list(topics))
 
 
-def subscribe(topics: Sequence[str], max_rate_hz: float, queue: int, content: Content, last: bool) -> Stream[TopicBatch]:
+def subscribe(
+    topics: Sequence[str], max_rate_hz: float, queue: int, content: Content, last: bool
+) -> Stream[TopicBatch]:
     if content not in _CONTENTS:
         raise InvalidArgumentError(f'content is "{content}", must be one of {", ".join(_CONTENTS)}', "content")
     found = method("TopicService/Subscribe")
@@ -406,5 +431,10 @@ def subscribe(topics: Sequence[str], max_rate_hz: float, queue: int, content: Co
 
 
 def publish(topic: str, sample: Sample, type_name: str, schema: str) -> Unary[None]:
-    given = {"cdr": sample} if isinstance(sample, bytes) else {"json": json.dumps(sample, default=_plain)}
-    return _unary("TopicService/Publish", _nothing, topic=topic, type=type_name, schema=schema, **given)
+    found = method("TopicService/Publish")
+    request = found.request(topic=topic, type=type_name, schema=schema)
+    if isinstance(sample, bytes):
+        request.cdr = sample
+    else:
+        request.json = json.dumps(sample, default=_plain)
+    return Unary(found, request, _nothing)

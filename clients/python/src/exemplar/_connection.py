@@ -49,7 +49,7 @@ class Credentials:
         ca = tls_ca or os.environ.get("EXEMPLAR_TLS_CA", "")
         certificate = tls_cert or os.environ.get("EXEMPLAR_TLS_CERT", "")
         key = tls_key or os.environ.get("EXEMPLAR_TLS_KEY", "")
-        given = token or os.environ.get("EXEMPLAR_TOKEN", "")
+        given = token or os.environ.get("EXEMPLAR_TOKEN") or ""
         if bool(certificate) != bool(key):
             raise InvalidArgumentError("tls_cert and tls_key must be given together", "tls_cert")
         if certificate and not ca:
@@ -96,11 +96,14 @@ class Settings:
     ) -> None:
         one = checked_address(server or os.environ.get("EXEMPLAR_SERVER") or DEFAULT_SERVER, "server")
         of_learning = checked_address(learning or one, "learning")
+        of_recorder = checked_address(recorder or one, "recorder")
         self._addresses = {
             "TrialService": of_learning,
             "SkillService": of_learning,
+            "LearningDataService": of_learning,
             "ExecutorService": checked_address(executor or one, "executor"),
-            "RecorderService": checked_address(recorder or one, "recorder"),
+            "RecorderService": of_recorder,
+            "RecorderDataService": of_recorder,
             "TopicService": one,
         }
         self.credentials = credentials

@@ -82,38 +82,59 @@ class InternalError(ExemplarError):
     """A fault of the service."""
 
 
+class UnauthenticatedError(ExemplarError, PermissionError):
+    """No token or certificate was shown, or one that is not known or has expired; `field` says which."""
+
+    code = "unauthenticated"
+
+
+class PermissionDeniedError(ExemplarError, PermissionError):
+    """The caller is known and lacks the role that the call takes; the message names both."""
+
+    code = "permission_denied"
+
+
+class UnimplementedError(ExemplarError, NotImplementedError):
+    """Not served there: the address of another service, or one of another version."""
+
+    code = "unimplemented"
+
+
 _BY_CODE: dict[str, type[ExemplarError]] = {kind.code: kind for kind in ExemplarError.__subclasses__()}
 
 # What a code of gRPC means that came without our detail: from gRPC itself, or from a server that is not ours.
 _WITHOUT_DETAIL: dict[grpc.StatusCode, type[ExemplarError]] = {
     grpc.StatusCode.ABORTED: FailedPreconditionError,
     grpc.StatusCode.OUT_OF_RANGE: InvalidArgumentError,
-    grpc.StatusCode.PERMISSION_DENIED: FailedPreconditionError,
-    grpc.StatusCode.UNAUTHENTICATED: FailedPreconditionError,
 }
 
 
-def from_detail(detail: Any) -> ExemplarError:
-    """The exception for an ErrorDetail."""
-    return _BY_CODE.get(detail.code, InternalError)(detail.message, detail.field)
+def from_detail(detail: Any, code: grpc.StatusCode = grpc.StatusCode.INTERNAL) -> ExemplarError:
+    """The exception for an ErrorDetail. code: counts where a server of another version names one that is not known."""
+    return (_BY_CODE.get(detail.code) or _of_status(code))(detail.message, detail.field)
 
 
 def from_rpc(error: Any, address: str) -> ExemplarError:
     """The exception for what a call of gRPC raised, which has code(), details() and trailing_metadata()."""
     detail = _detail(error.trailing_metadata() or ())
     if detail is not None:
-        return from_detail(detail)
+        return from_detail(detail, error.code())
     code = error.code()
     if code == grpc.StatusCode.UNAVAILABLE:
         return UnavailableError(f"no answer from {address}: {error.details()}")
     if code == grpc.StatusCode.DEADLINE_EXCEEDED:
         return DeadlineExceededError(f"{address} did not answer in time")
     if code == grpc.StatusCode.UNIMPLEMENTED:
-        return FailedPreconditionError(f"{address} does not serve this call: {error.details()}")
+        return UnimplementedError(f"{address} does not serve this call: {error.details()}")
     if code == grpc.StatusCode.CANCELLED:
         return CancelledError(f"the call to {address} was cancelled")
-    kind = _WITHOUT_DETAIL.get(code) or _BY_CODE.get(code.name.lower(), InternalError)
-    return kind(f"{address}: {error.details()}")
+    return _of_status(code)(f"{address}: {error.details()}")
+
+
+def _of_status(code: grpc.StatusCode) -> type[ExemplarError]:
+    if code in _WITHOUT_DETAIL:
+        return _WITHOUT_DETAIL[code]
+    return _BY_CODE.get(code.name.lower(), InternalError)
 
 
 def _detail(metadata: Iterable[tuple[str, Any]]) -> Any:

@@ -13,12 +13,15 @@ from ._trial import PoseSeries, ScalarSeries, Trial
 from ._values import (
     Contact,
     ContactReport,
+    DataItem,
+    DataReport,
     Evaluation,
     ExecutionResult,
     Feedback,
     Marker,
     MethodScore,
     Motion,
+    PersonInfo,
     Plan,
     Progress,
     RecorderStatus,
@@ -32,6 +35,8 @@ from ._values import (
     Submission,
     Suggestion,
     Suggestions,
+    TeleoperationFeedback,
+    TeleoperationResult,
     TopicBatch,
     TopicFigures,
     TopicInfo,
@@ -113,9 +118,7 @@ def topic_sample(m: Message) -> TopicSample:
 
 
 def topic_batch(m: Message) -> TopicBatch:
-    return TopicBatch(
-        tuple(topic_info(x) for x in m.topics), tuple(topic_sample(x) for x in m.samples), m.missed
-    )
+    return TopicBatch(tuple(topic_info(x) for x in m.topics), tuple(topic_sample(x) for x in m.samples), m.missed)
 
 
 def trial_info(m: Message) -> TrialInfo:
@@ -128,6 +131,7 @@ def trial_info(m: Message) -> TrialInfo:
         strings(m.streams),
         m.samples,
         strings(m.notices),
+        m.person,
     )
 
 
@@ -315,6 +319,45 @@ def execution_result(m: Message) -> ExecutionResult:
     )
 
 
+def number(m: Message, field: str) -> float | None:
+    return getattr(m, field) if m.HasField(field) else None
+
+
+def teleoperation_feedback(m: Message) -> TeleoperationFeedback:
+    return TeleoperationFeedback(
+        state=m.state,
+        phase=m.phase,
+        detail=m.detail,
+        time_s=m.time_s,
+        behind_rad=m.behind_rad,
+        behind_joint=m.behind_joint,
+        tracking_error_rad=m.tracking_error_rad,
+        touch_n=m.touch_n,
+        clearance_m=number(m, "clearance_m"),
+        suit_rate_hz=m.suit_rate_hz,
+    )
+
+
+def teleoperation_result(m: Message) -> TeleoperationResult:
+    return TeleoperationResult(
+        state=m.state,
+        detail=m.detail,
+        duration_s=m.duration_s,
+        following_s=m.following_s,
+        suit_samples=m.suit_samples,
+        suit_samples_left_out=m.suit_samples_left_out,
+        commands_sent=m.commands_sent,
+        holds=m.holds,
+        blocks=m.blocks,
+        tracking_error_rad=m.tracking_error_rad,
+        clearance_m=number(m, "clearance_m"),
+        touch_max_n=m.touch_max_n,
+        latency_p50_s=m.latency_p50_s,
+        latency_p99_s=m.latency_p99_s,
+        latency_max_s=m.latency_max_s,
+    )
+
+
 def robot_status(m: Message) -> RobotStatus:
     return RobotStatus(
         state=m.state,
@@ -350,3 +393,12 @@ def recorder_status(m: Message) -> RecorderStatus:
         left_out=m.left_out,
         buffered_s=m.buffered_s,
     )
+
+
+def person_info(m: Message) -> PersonInfo:
+    return PersonInfo(m.person, m.items, m.bytes, time(m, "first"), time(m, "last"))
+
+
+def data_report(m: Message) -> DataReport:
+    items = (DataItem(x.kind, x.name, x.action, x.detail, x.bytes, time(x, "at")) for x in m.items)
+    return DataReport(tuple(items), strings(m.notices))

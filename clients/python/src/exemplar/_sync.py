@@ -10,11 +10,11 @@ from typing import Any, Generic, TypeVar
 
 import grpc
 
-from . import _calls
+from . import _calls, _data
 from ._connection import CHANNEL_OPTIONS, Arrivals, Outcome, QueryStream, Settings, closed
 from ._errors import from_rpc
 from ._pose import Objects, PoseLike
-from ._values import Motion, TopicBatch, TopicInfo, TopicSample
+from ._values import DataReport, Motion, TopicBatch, TopicInfo, TopicSample
 from ._wire import Message, Method
 
 T = TypeVar("T")
@@ -212,6 +212,18 @@ class Link:
         """Begins."""
         stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
         return Operation(call, stream, self.settings.address(call.method))
+
+    def copy(self, call: _data.Copy, timeout: float | None = None) -> None:
+        """Into the backup's file."""
+        stream = self._open(call.method, call.request, _calls.limit_s(None, timeout, True))
+        with _errors_of(self.settings.address(call.method)):
+            for message in stream:
+                call.take(message)
+
+    def restore(self, call: _data.Restoration, timeout: float | None = None) -> DataReport:
+        """Answers once all is sent and taken over."""
+        invoke = self.channel(call.method).stream_unary(call.method.path, **call.method.codec())
+        return call.read(self._wait(call.method, invoke, call.requests(), timeout, True))
 
     def subscribe(self, call: _calls.Stream[TopicBatch], timeout: float | None = None) -> Subscription:
         """Begins."""

@@ -83,6 +83,8 @@ class TrialInfo:
     streams: tuple[str, ...]
     samples: int
     notices: tuple[str, ...]
+    person: str
+    """Whose demonstration it is, a pseudonymous id; "": unknown."""
 
 
 @dataclass(frozen=True)
@@ -368,6 +370,52 @@ class ExecutionResult:
         return self.state == "done"
 
 
+@dataclass(frozen=True)
+class TeleoperationFeedback:
+    """A robot that follows a suit: phase "holding", "approaching", "following", "blocked"; `detail` says why.
+
+    behind_rad: largest over the joints, the operator's posture against the commanded one, and behind_joint which.
+    clearance_m: of the last measured state, None where it was not measured.
+    """
+
+    state: str
+    phase: str
+    detail: str
+    time_s: float
+    behind_rad: float
+    behind_joint: str
+    tracking_error_rad: float
+    touch_n: float
+    clearance_m: float | None
+    suit_rate_hz: float
+
+
+@dataclass(frozen=True)
+class TeleoperationResult:
+    """How teleoperation ended. following_s: in which the robot followed. latency: from a suit sample to its command."""
+
+    state: str
+    detail: str
+    duration_s: float
+    following_s: float
+    suit_samples: int
+    suit_samples_left_out: int
+    commands_sent: int
+    holds: int
+    blocks: int
+    tracking_error_rad: float
+    clearance_m: float | None
+    touch_max_n: float
+    latency_p50_s: float
+    latency_p99_s: float
+    latency_max_s: float
+
+    @property
+    def done(self) -> bool:
+        """Whether it was ended as asked; else `detail` says what ended it."""
+        return self.state == "done"
+
+
 @dataclass(frozen=True, eq=False)
 class SeenObject:
     """An object as the cameras saw it, `age_s` ago."""
@@ -424,3 +472,55 @@ class RecorderStatus:
     pauses: int
     left_out: int
     buffered_s: float
+
+
+@dataclass(frozen=True)
+class PersonInfo:
+    """One person's data in one service: `items` trials or recordings. `person` "": of nobody knows whom."""
+
+    person: str
+    items: int
+    bytes: int
+    first: datetime | None
+    last: datetime | None
+
+
+@dataclass(frozen=True)
+class DataItem:
+    """One thing that was done, or would be: `kind` "trial", `name` its id, `action` "deleted"."""
+
+    kind: str
+    name: str
+    action: str
+    detail: str
+    bytes: int
+    at: datetime | None
+
+
+@dataclass(frozen=True)
+class DataReport:
+    """What was done to a service's data."""
+
+    items: tuple[DataItem, ...]
+    notices: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class BackupService:
+    """What a backup holds of one service, "learning" or "recorder"."""
+
+    service: str
+    schema: int
+    parts: int
+    bytes: int
+    counts: dict[str, int]
+    notices: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Backup:
+    """What a backup file holds; `program` is the version of what wrote it."""
+
+    made: datetime
+    program: str
+    services: tuple[BackupService, ...]
