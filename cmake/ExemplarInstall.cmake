@@ -9,6 +9,8 @@ foreach(folder deploy/models deploy/config deploy/dds)
     install(DIRECTORY "${CMAKE_SOURCE_DIR}/${folder}" DESTINATION "${EXEMPLAR_SHARE}" COMPONENT runtime-services)
   endif()
 endforeach()
+# The web page, where deploy/build could make it.
+install(DIRECTORY "${CMAKE_SOURCE_DIR}/build/web/" DESTINATION "${EXEMPLAR_SHARE}/web" COMPONENT runtime-services OPTIONAL)
 install(DIRECTORY "${CMAKE_SOURCE_DIR}/idl" DESTINATION "${EXEMPLAR_SHARE}" COMPONENT runtime-services
   FILES_MATCHING PATTERN "*.idl" PATTERN include EXCLUDE)
 install(DIRECTORY "${CMAKE_SOURCE_DIR}/proto" DESTINATION "${EXEMPLAR_SHARE}" COMPONENT development

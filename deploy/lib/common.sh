@@ -27,6 +27,22 @@ install_packages() {
   rm -f "$log"
 }
 
+# build_web: the web page into build/web, where npm is there and can fetch; else says so and goes on
+build_web() {
+  local log=build/web.log stale
+  mkdir -p build
+  if [ -f build/web/index.html ]; then
+    stale=$(find clients/web -name node_modules -prune -o -type f -newer build/web/index.html -print -quit)
+    [ -n "$stale" ] || return 0
+  fi
+  command -v npm >/dev/null || { say "npm is not installed: there will be no web page"; return 0; }
+  say "building the web page"
+  [ -d clients/web/node_modules/esbuild ] ||
+    npm ci --prefix clients/web --omit=dev --no-fund --no-audit --fetch-retries=1 --loglevel=error >"$log" 2>&1 ||
+    { say "the web page's packages could not be fetched ($log): there will be no web page"; return 0; }
+  node clients/web/build.mjs >>"$log" 2>&1 || { tail -n 20 "$log" >&2; die "the web page could not be built ($log)"; }
+}
+
 # build_preset PRESET [cmake options --] TARGET...: configures where needed, and builds
 build_preset() {
   local preset=$1; shift

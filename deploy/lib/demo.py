@@ -12,13 +12,14 @@ import shutil
 import sys
 
 import picture
-from processes import Failure, Narrator, System, free_port, wait_until
+from processes import Failure, Narrator, System, free_port, is_free, wait_until
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SKILL = "press"
 # Where the simulated person presses the button: seven places on the table, and the eighth for the robot alone.
 PERSON_PLACES = [(0.46, -0.12), (0.40, -0.28), (0.52, -0.22), (0.36, -0.18), (0.48, -0.34), (0.42, -0.05), (0.54, -0.10)]
 NEW_PLACE = (0.45, -0.20)
+PAGE_PORT = 8080  # or another, where that is taken
 # The last figures that count as a success.
 MAX_CONTACT_ERROR_MM = 12.7  # the paper's half inch: how well its vision located an object
 MAX_TRACKING_ERROR_RAD = 0.1
@@ -35,6 +36,7 @@ def parse(arguments):
     parser.add_argument("--domain", type=int, default=77)
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "release" / "bin")
     options = parser.parse_args(arguments)
+    options.headless = options.headless or not sys.stdin.isatty()
     if options.rate is not None and not options.rate > 0:
         parser.error(f"--rate: {options.rate} is not a positive number")
     return options
@@ -79,6 +81,7 @@ class Demo:
         shutil.rmtree(options.keep, ignore_errors=True)
         self.system = System(options.bin, options.keep, options.domain, "demo", options.secured)
         self.recordings = options.keep / "recordings"
+        self.page = None
 
     # ---- what both forms share ----
 
@@ -91,14 +94,30 @@ class Demo:
         self.recorder = recorder.address()
         self.learning = self.skills = learning.address()
 
-    def start_gateway(self):
+    def start_gateway(self, scene):
         """From here on everything is asked at one address. Before this, captures begin once somebody reads what they
         send, and that has to be the recorder and the robot."""
         self.executor_port = free_port()
         gateway = self.system.start(
-            "gateway", "--learning", self.learning, "--recorder", self.recorder, "--executor", f"127.0.0.1:{self.executor_port}", server=True
-        )
+            "gateway", "--learning", self.learning, "--recorder", self.recorder, "--executor", f"127.0.0.1:{self.executor_port}",
+            *self.page_options(scene), server=True,
+        )  # fmt: skip
         self.recorder = self.skills = self.executor = gateway.address()
+        if self.page:
+            self.say.step(f"the web page: {self.page}")
+
+    def page_options(self, scene):
+        """For a person at a terminal: the gateway's web page. In a secured station it would want a login."""
+        if self.options.headless or self.options.secured:
+            return []
+        port = PAGE_PORT if is_free(PAGE_PORT) else free_port()
+        self.page = f"http://localhost:{port}/"
+        return ["--http", f"127.0.0.1:{port}", "--robot", self.robot, "--scene", scene, "--recordings", self.recordings]
+
+    def wait_for_person(self):
+        if self.page:
+            self.say.step(f"try it yourself: {self.page} (Enter ends the demo)")
+            sys.stdin.readline()
 
     def submit_and_learn(self):
         files = sorted(self.recordings.glob("trial-*.mcap"))
@@ -119,7 +138,7 @@ class Demo:
         self.simulator = self.system.start("simulator", "--robot", self.robot, "--scene", scene, *simulator_options)
 
     def start_executor(self, scene):
-        self.start_gateway()
+        self.start_gateway(scene)
         executor = self.system.start(
             "executor", "--robot", self.robot, "--scene", scene, "--learning", self.learning, server=True, port=self.executor_port
         )
@@ -175,7 +194,7 @@ class Demo:
                 self.say.detail(f"{'button clicks':44} {value}")
         self.say.detail(f"picture: {self.options.keep / 'result.svg'}")
         self.say.detail("passed" if figures["passed"] else "FAILED: " + "; ".join(figures["failures"]))
-        print(json.dumps(figures))
+        print(json.dumps(figures), flush=True)
 
     def figures(self, trials, evaluation, execution, extra_failures=(), **more):
         deviation = evaluation["deviation"] if evaluation else {}
@@ -358,6 +377,7 @@ def main():
             demo.from_files()
         else:
             demo.from_person()
+        demo.wait_for_person()
     except (Failure, KeyboardInterrupt) as failure:
         print(f"deploy/demo: {failure or 'interrupted'}\nlogs: {demo.system.logs}", file=sys.stderr)
         print(json.dumps({"passed": False, "failures": [str(failure) or "interrupted"]}))

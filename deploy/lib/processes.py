@@ -165,6 +165,17 @@ def free_port():
         return probe.getsockname()[1]
 
 
+def is_free(port):
+    """Whether a program could listen on this port of loopback now."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+        return True
+
+
 def wait_until(what, condition, timeout_s, interval_s=0.1):
     """Polls `condition` until it returns something true, and returns that."""
     deadline = time.monotonic() + timeout_s

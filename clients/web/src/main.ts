@@ -2,6 +2,7 @@ import "./style.css";
 import { Client } from "./client";
 import { byId, make, say, setText } from "./dom";
 import { CallError, explain } from "./errors";
+import { toNumber } from "./format";
 import { Live } from "./live";
 import { AskPanel } from "./panels/ask";
 import { RecordPanel } from "./panels/record";
@@ -110,7 +111,7 @@ class Page {
         const object = content as ObjectPose;
         const quaternion = object.has_orientation ? object.base_T_object.quaternion_xyzw : undefined;
         this.view?.see(object.name, object.base_T_object.position_m, quaternion);
-        this.ask.sights.set(object.name, { position: object.base_T_object.position_m, quaternion, at_ms: performance.now() });
+        this.ask.see(object.name, object.base_T_object.position_m, quaternion);
         break;
       }
       case "ircp/plan":
@@ -125,7 +126,7 @@ class Page {
 
   private onJoints(state: JointState): void {
     const tool = this.view?.setJoints(state.names, state.positions);
-    const at_s = performance.now() / 1e3;
+    const at_s = toNumber(state.stamp_ns) / 1e9; // the source's own: on the way, samples may bunch
     const touch = state.touch_n.reduce((sum, force) => sum + Number(force), 0);
     let speed = 0;
     if (tool !== undefined) {
@@ -232,7 +233,7 @@ class Page {
 
   private setTheme(theme: string): void {
     document.documentElement.dataset["theme"] = theme;
-    byId("theme").setAttribute("aria-pressed", String(theme === "dark"));
+    setText(byId("theme"), theme === "dark" ? "Light" : "Dark");
     this.view?.setTheme(theme === "dark");
     this.answerPlot.rebuild();
     this.robotPlot.rebuild();

@@ -50,7 +50,7 @@ export interface SubscribeMessage { samples?: TopicSample[]; missed?: string }
 export interface Health { status: string; backends: { name: string; address: string; serving: boolean }[] }
 
 // Samples of topics, as their IDL has them.
-export interface JointState { source: string; names: string[]; positions: number[]; touch_n: number[] }
+export interface JointState { source: string; stamp_ns: number | string; names: string[]; positions: number[]; touch_n: number[] }
 export interface ObjectPose { name: string; base_T_object: { position_m: number[]; quaternion_xyzw: number[] }; has_orientation: boolean }
 export interface PlanSample { skill: string; times_s: number[]; tool_m: number[] }
 export interface StatusSample { source: string; program: string; state: string; detail: string; values: { name: string; value: string }[] }

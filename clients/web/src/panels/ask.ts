@@ -10,9 +10,15 @@ import type { NamedPose, Pose, Quaternion, SkillMotion } from "../types";
 import type { View } from "../view/view";
 import type { Chosen } from "./skill";
 
-interface Place { position: THREE.Vector3; rotation: Quaternion | undefined; inputs: HTMLInputElement[] }
+interface Place {
+  position: THREE.Vector3;
+  rotation: Quaternion | undefined;
+  inputs: HTMLInputElement[];
+  /** A person put it there. */
+  touched: boolean;
+}
 interface Question { chosen: Chosen; objects: NamedPose[]; start: Pose | undefined; asked_ms: number }
-export interface Sight { position: readonly number[]; quaternion: readonly number[] | undefined; at_ms: number }
+interface Sight { position: readonly number[]; quaternion: readonly number[] | undefined; at_ms: number }
 
 const FRESH_MS = 3000;
 const AXES = ["x", "y", "z"] as const;
@@ -21,7 +27,7 @@ const AXES = ["x", "y", "z"] as const;
 export class AskPanel {
   /** Told of every new question: what was planned for another one holds no more. */
   onQuestion: () => void = () => undefined;
-  readonly sights = new Map<string, Sight>();
+  private readonly sights = new Map<string, Sight>();
   /** Where the tool is now, if that is known. */
   tool: Pose | undefined;
   private readonly box = byId("objects");
@@ -81,7 +87,13 @@ export class AskPanel {
     this.latest.ask({ chosen: this.chosen, objects: this.objects(), start, asked_ms: performance.now() });
   }
 
-  /** Whether an object stands where it was last seen. */
+  /** An object was seen; one that nobody has moved here yet goes there. */
+  see(name: string, position: readonly number[], quaternion: readonly number[] | undefined): void {
+    this.sights.set(name, { position, quaternion, at_ms: performance.now() });
+    if (this.places.get(name)?.touched === false) this.takeSeen();
+  }
+
+  /** Whether there are objects to take from where they are seen. */
   tellSights(now_ms: number): void {
     const seen = [...this.places.keys()].filter((name) => now_ms - (this.sights.get(name)?.at_ms ?? -1e9) < FRESH_MS);
     this.asSeen.disabled = seen.length === 0;
@@ -103,18 +115,22 @@ export class AskPanel {
         const place = this.places.get(object.name);
         if (place === undefined) return;
         place.position[axis] = value;
+        place.touched = true;
         this.showHandles();
         this.ask();
       });
       return input;
     });
     const labels = inputs.map((input, i) => make("label", "", AXES[i] ?? "", input));
-    this.box.append(make("div", "object", make("h3", "", object.name, make("span", "muted", "  (m; drag it in the picture, Shift lifts)")), ...labels));
-    this.places.set(object.name, { position, rotation: fresh ? rotationOf(sight) : undefined, inputs });
+    this.box.append(make("div", "object", make("h3", "", object.name, make("span", "muted", " in m; drag it, Shift lifts")), ...labels));
+    this.places.set(object.name, { position, rotation: fresh ? rotationOf(sight) : undefined, inputs, touched: fresh });
   }
 
   private moved(name: string, position: THREE.Vector3): void {
-    this.places.get(name)?.position.copy(position);
+    const place = this.places.get(name);
+    if (place === undefined) return;
+    place.position.copy(position);
+    place.touched = true;
     this.showInputs();
     this.ask();
   }
@@ -125,6 +141,7 @@ export class AskPanel {
       if (sight === undefined) continue;
       place.position.set(sight.position[0] ?? 0, sight.position[1] ?? 0, sight.position[2] ?? 0);
       place.rotation = rotationOf(sight);
+      place.touched = true;
     }
     this.showPlaces();
     this.ask();
@@ -143,7 +160,7 @@ export class AskPanel {
     for (const place of this.places.values()) {
       place.inputs.forEach((input, i) => {
         if (input === document.activeElement && input.valueAsNumber === place.position.getComponent(i)) return;
-        input.value = place.position.getComponent(i).toFixed(4);
+        input.value = place.position.getComponent(i).toFixed(3);
       });
     }
   }

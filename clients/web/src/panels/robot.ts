@@ -115,7 +115,7 @@ export class RobotPanel {
     this.showState();
     say(this.verdict, "Planning…");
     try {
-      const { plan } = await this.client.call<{ plan: PlanSummary }>("ExecutorService/Plan", { execution: { ...execution, speed: this.speed.valueAsNumber } });
+      const { plan } = await this.client.call<{ plan: PlanSummary }>("ExecutorService/Plan", { execution });
       say(this.verdict, judge(plan), plan.warnings.length > 0 ? "warn" : "good");
       this.figures(planFigures(plan));
     } catch (error) {
@@ -135,7 +135,7 @@ export class RobotPanel {
     try {
       let result: ExecutionResult | undefined;
       await this.client.stream<{ feedback?: ExecutionFeedback; result?: ExecutionResult }>(
-        "ExecutorService/Execute", { execution: { ...execution, speed: this.speed.valueAsNumber } }, (message) => {
+        "ExecutorService/Execute", { execution }, (message) => {
           if (message.feedback !== undefined) this.feedback(message.feedback);
           result = message.result ?? result;
         }, this.ours.signal);
@@ -163,7 +163,7 @@ export class RobotPanel {
     const touched = result.contact_error_m === undefined ? "" : `, contact ${mm(result.contact_error_m)} off`;
     const said = result.state === "done" ? `Done${touched}; touch up to ${number(result.touch_max_n, 1, "N")}.` : `${words(result.state)}: ${result.detail}`;
     say(this.verdict, said, result.state === "done" ? "good" : "bad");
-    this.figures([["clearance", mm(result.clearance_m)], ["off the path", number(result.tracking_error_rad, 3, "rad")], ["contact", mm(result.contact_error_m)], ["touch", number(result.touch_max_n, 1, "N")]]);
+    this.figures([["clearance", mm(result.clearance_m)], ["tracking", number(result.tracking_error_rad, 3, "rad")], ["contact", mm(result.contact_error_m)], ["touch", number(result.touch_max_n, 1, "N")]]);
   }
 
   private async order(what: "Pause" | "Resume" | "Cancel" | "Reset" | "SetSpeed", request: object = {}): Promise<void> {
@@ -205,5 +205,5 @@ export function judge(plan: PlanSummary): string {
 }
 
 function planFigures(plan: PlanSummary): [string, string][] {
-  return [["duration", seconds(plan.duration_s)], ["off the answer", mm(plan.max_position_error_m)], ["in contact", mm(plan.max_contact_error_m)], ["slowed", `${number(plan.time_stretch, 2)} ×`]];
+  return [["duration", seconds(plan.duration_s)], ["off", mm(plan.max_position_error_m)], ["in contact", mm(plan.max_contact_error_m)], ["slowed", `${number(plan.time_stretch, 2)} ×`]];
 }

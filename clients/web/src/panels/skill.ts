@@ -130,7 +130,7 @@ export class SkillPanel {
     const parts: Node[] = [];
     if (report.methods.length > 0) {
       parts.push(make("p", "muted", "Left-out trials, predicted from the others:"));
-      parts.push(table(["method", "Fréchet", "at its end"], report.methods.map((score) => ({
+      parts.push(table(["method", "Fréchet", "end"], report.methods.map((score) => ({
         cells: [score.chosen ? `${score.method} ✓` : score.method, cm(score.frechet_m), cm(score.end_error_m)], mark: score.chosen ? "chosen" : "",
       }))));
     }

@@ -12,7 +12,10 @@ THREE.Object3D.DEFAULT_UP.set(0, 0, 1);
 export type Layer = "trials" | "answer" | "plan" | "measured";
 const SEEN_FOR_MS = 3000;
 const STEP_M = 0.01;
+/** Nearer than this, an object and the place asked about share a label. */
+const ONE_LABEL_M = 0.03;
 const FARTHEST_M = 3;
+const TRAIL_MS = 120;
 
 /** The picture: everything in the robot's base frame, z up, metres. Drawn when something changed. */
 export class View {
@@ -38,6 +41,8 @@ export class View {
   private palette: Palette = light;
   private motion: SkillMotion | undefined;
   private trail: number[] = [];
+  private trailGrew = false;
+  private trailDrawn_ms = 0;
   private changed = true;
   private drawn: (() => void)[] = [];
   private frames: number[] = [];
@@ -77,7 +82,7 @@ export class View {
     if (this.robot !== undefined) this.scene.remove(this.robot.group);
     this.robot = await Robot.load(description, () => this.touch());
     this.scene.add(this.robot.group);
-    this.focus.copy(this.robot.tool()).multiplyScalar(0.75);
+    this.focus.copy(this.robot.tool()).multiplyScalar(0.95);
     this.home();
     this.setGround();
     return this.robot.missing;
@@ -164,10 +169,13 @@ export class View {
     const last = new THREE.Vector3(this.trail[n - 3] ?? 1e9, this.trail[n - 2] ?? 0, this.trail[n - 1] ?? 0);
     if (last.distanceTo(position) < 5e-4) return;
     this.trail.push(position.x, position.y, position.z);
-    this.setMeasured(Float32Array.from(this.trail));
+    this.trailGrew = true;
+    this.touch();
   }
 
+  /** The tool's way as the robot measured it, in place of the trail. */
   setMeasured(points: Float32Array): void {
+    this.trailGrew = false;
     this.measured.set(points);
     this.measured.colour(this.palette.measured);
     this.touch();
@@ -197,7 +205,7 @@ export class View {
 
   home(): void {
     this.controls.target.copy(this.focus);
-    this.camera.position.copy(this.focus).add(new THREE.Vector3(1.15, -1.25, 0.95));
+    this.camera.position.copy(this.focus).add(new THREE.Vector3(0.9, -0.9, 0.66));
     this.controls.update();
     this.touch();
   }
@@ -242,6 +250,14 @@ export class View {
     this.veil.set(points, motion.sigma_m);
   }
 
+  /** A line cannot grow, only be made anew: not for every sample. */
+  private drawTrail(): void {
+    const now = performance.now();
+    if (!this.trailGrew || now - this.trailDrawn_ms < TRAIL_MS) return;
+    this.trailDrawn_ms = now;
+    this.setMeasured(Float32Array.from(this.trail));
+  }
+
   private setGround(): void {
     if (this.grid !== undefined) this.scene.remove(this.grid);
     let height = this.things.lowest();
@@ -266,6 +282,7 @@ export class View {
   private draw(): void {
     if (!this.changed || document.hidden) return;
     this.changed = false;
+    this.drawTrail();
     this.lamp.position.copy(this.camera.position).add(new THREE.Vector3(0.4, 0.6, 1.2));
     this.renderer.render(this.scene, this.camera);
     this.frames.push(performance.now());
@@ -284,11 +301,12 @@ export class View {
   private drawLabels(): void {
     const wanted = new Set<string>();
     for (const { name, position, fresh } of this.things.seen(performance.now(), SEEN_FOR_MS)) {
+      if ((this.handles.get(name)?.group.position.distanceTo(position) ?? 1) < ONE_LABEL_M) continue;
       this.label(`seen ${name}`, fresh ? `${name} (seen)` : `${name} (not seen now)`, position, 24);
       wanted.add(`seen ${name}`);
     }
     for (const [name, handle] of this.handles) {
-      this.label(`ask ${name}`, name, handle.group.position, -30);
+      this.label(`ask ${name}`, name, handle.group.position, -36);
       wanted.add(`ask ${name}`);
       const at = this.toScreen(handle.group.position);
       this.box.dataset[`handle_${name}`] = `${at.x.toFixed(1)},${at.y.toFixed(1)}`;
