@@ -32,7 +32,7 @@ def main():
             if pip(python, python, "pytest", "mypy", "types-grpcio").returncode != 0:
                 print("SKIPPED: PyPI cannot be reached, and Debian's packages are not installed", flush=True)
                 return SKIPPED
-            pip(python, python, CLIENT).check_returncode()
+            pip(python, python, f"{CLIENT}[recordings]").check_returncode()
         return run(HERE / "run_isolated", python, "-m", "pytest", "-q", "-p", "no:cacheprovider", CLIENT / "tests", check=False)
 
 

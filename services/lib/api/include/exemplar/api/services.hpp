@@ -252,7 +252,7 @@ class ExecutorApi {
   virtual Result<TeleoperationResult> Teleoperate(
       const TeleoperationRequest& /*request*/,
       const std::function<void(const TeleoperationFeedback&)>& /*feedback*/,
-      std::stop_token /*stop*/) {
+      std::stop_token /*stop*/) {  // NOLINT(performance-unnecessary-value-param): as overridden
     return FailedPrecondition("this executor cannot be teleoperated");
   }
   virtual Status EndTeleoperation() {
