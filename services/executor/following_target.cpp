@@ -142,7 +142,7 @@ double TargetTrack::Folded(double along, bool* backwards) const {
 }
 
 Eigen::Vector3d TargetTrack::PositionAt(Duration time) const {
-  const Eigen::Vector3d straight = StraightAt(time);
+  Eigen::Vector3d straight = StraightAt(time);
   if (turning_points() == 0) return straight;
   const double along = Along(straight);
   bool backwards = false;

@@ -7,6 +7,7 @@ namespace exemplar::executor {
 std::vector<Metric> MetricsOf(const Executor& executor) {
   const std::string prefix = "exemplar_executor";
   std::vector<std::string> states;
+  states.reserve(std::size(kAllStates));
   for (const State state : kAllStates) states.emplace_back(ToString(state));
   std::vector<Metric> metrics = ircp::ReceivedMetrics(prefix, executor.readers());
   metrics.push_back(ircp::SentMetric(prefix, [&executor] { return executor.sent(); }));

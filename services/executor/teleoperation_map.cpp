@@ -85,7 +85,7 @@ class MapFile {
 
   std::string Text(const YAML::Node& node, const std::string& place, const char* key) {
     const YAML::Node value = node[key];
-    const std::string text = value && value.IsScalar() ? value.Scalar() : "";
+    std::string text = value && value.IsScalar() ? value.Scalar() : "";
     if (text.empty()) {
       Complain(value ? value : node, place, std::string("\"") + key + "\" must name a joint");
     }

@@ -164,13 +164,13 @@ Status CheckNames(const RobotModel& model, const Scene& scene) {
                            "\": a link of the robot or another object has this name");
   };
   for (const SceneObject& object : scene.objects) {
-    if (const Status free = claim(object.name); !free.ok()) return free;
+    if (Status free = claim(object.name); !free.ok()) return free;
   }
   for (const PointCloud& cloud : scene.clouds) {
-    if (const Status free = claim(cloud.name); !free.ok()) return free;
+    if (Status free = claim(cloud.name); !free.ok()) return free;
   }
   for (const HeldObject& held : scene.held) {
-    if (const Status free = claim(held.name); !free.ok()) return free;
+    if (Status free = claim(held.name); !free.ok()) return free;
   }
   return {};
 }
@@ -231,6 +231,7 @@ std::vector<Lever> LeversBetween(const RobotModel& model, const RobotPart& first
   }
   AddLevers(model, first, above_first, levers);
   std::vector<Lever> out;
+  out.reserve(levers.size());
   for (const auto& [joint, length] : levers) out.push_back({joint, length});
   return out;
 }
