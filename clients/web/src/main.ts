@@ -19,8 +19,8 @@ const LAYERS: Layer[] = ["trials", "answer", "plan", "measured"];
 class Page {
   private readonly client = new Client();
   private readonly view = this.makeView();
-  private readonly answerPlot = new TimePlot(byId("answer-plot"), [{ label: "error, mm", colour: "--blue-text", scale: "mm" }, { label: "objectivity", colour: "--violet", scale: "w" }], { w: [0, 1.02] });
-  private readonly robotPlot = new TimePlot(byId("robot-plot"), [{ label: "touch, N", colour: "--orange", scale: "n" }, { label: "tool, m/s", colour: "--teal", scale: "v" }]);
+  private readonly answerPlot = new TimePlot(byId("answer-plot"), [{ label: "error, mm", colour: "--blue-text", scale: "mm", least: 1 }, { label: "objectivity", colour: "--violet", scale: "w", least: 1 }], { w: [0, 1.02] });
+  private readonly robotPlot = new TimePlot(byId("robot-plot"), [{ label: "touch, N", colour: "--orange", scale: "n", least: 1 }, { label: "tool, m/s", colour: "--teal", scale: "v", least: 0.1 }]);
   private readonly recent = new Recent(2, 20);
   private readonly ask = new AskPanel(this.client, this.view, this.answerPlot);
   private readonly robot = new RobotPanel(this.client, this.view, this.ask, this.answerPlot);

@@ -1,7 +1,8 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
-interface Curve { label: string; colour: string; scale: string }
+/** `least`: what its axis shows at least. */
+interface Curve { label: string; colour: string; scale: string; least: number }
 
 function css(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -47,7 +48,7 @@ export class TimePlot {
     const series: uPlot.Series[] = [{}];
     this.curves.forEach((curve, i) => {
       const range = this.fixed[curve.scale];
-      scales[curve.scale] = range !== undefined ? { range } : { range: (_plot, _low, high) => [0, high > 0 ? high * 1.1 : 1] };
+      scales[curve.scale] = range !== undefined ? { range } : { range: (_plot, _low, high) => [0, Math.max(curve.least, high * 1.1)] };
       axes.push({ scale: curve.scale, side: i === 0 ? 3 : 1, stroke: css(curve.colour), grid: { show: i === 0, stroke: line, width: 1 }, ticks: { show: false }, size: 40, font: "11px system-ui", label: curve.label, labelSize: 14, labelFont: "11px system-ui", labelGap: 0 });
       series.push({ label: curve.label, scale: curve.scale, stroke: css(curve.colour), width: 1.6, points: { show: false } });
     });

@@ -66,7 +66,7 @@ export class RobotPanel {
     if (state === "executing" && before !== "executing" && before !== "paused") this.view?.beginTrail();
     const stopped = STOPPED.includes(this.state) || this.state === "aborted";
     const why = state === undefined ? detail : detail === "" ? "" : words(detail);
-    const hint = STOPPED.includes(this.state) ? " Reset when it is safe." : "";
+    const hint = STOPPED.includes(this.state) ? "; reset when it is safe." : "";
     say(this.detail, stopped || state === undefined ? `${why || words(this.state)}${hint}` : this.isMoving() ? this.heldBy() : "", stopped || state === undefined ? "bad" : "");
     this.showState();
   }
@@ -85,7 +85,7 @@ export class RobotPanel {
     this.stopButton.dataset["kind"] = "";
     try {
       await this.client.call("ExecutorService/Stop");
-      say(this.verdict, "Stopped. Reset when it is safe to go on.", "warn");
+      say(this.verdict, "");
     } catch (error) {
       this.stopButton.dataset["kind"] = "bad";
       say(this.verdict, `STOP did not reach the executor: ${explain(error, this.client.who)} Use the robot's own emergency stop.`, "bad");
@@ -161,6 +161,7 @@ export class RobotPanel {
   private ended(result: ExecutionResult): void {
     if (result.tool !== undefined && result.tool.time_s.length > 1) this.view?.setMeasured(positionsOf(result.tool.poses.map(Number), 7));
     const touched = result.contact_error_m === undefined ? "" : `, contact ${mm(result.contact_error_m)} off`;
+    if (STOPPED.includes(result.state)) return say(this.verdict, ""); // told beside the state
     const said = result.state === "done" ? `Done${touched}; touch up to ${number(result.touch_max_n, 1, "N")}.` : `${words(result.state)}: ${result.detail}`;
     say(this.verdict, said, result.state === "done" ? "good" : "bad");
     this.figures([["clearance", mm(result.clearance_m)], ["tracking", number(result.tracking_error_rad, 3, "rad")], ["contact", mm(result.contact_error_m)], ["touch", number(result.touch_max_n, 1, "N")]]);

@@ -17,6 +17,15 @@ const ONE_LABEL_M = 0.03;
 const FARTHEST_M = 3;
 const TRAIL_MS = 120;
 
+/** Whether WebGL is reckoned by the processor here: then smooth edges cost more than they are worth. */
+function isSoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const names = gl?.getExtension("WEBGL_debug_renderer_info");
+  const renderer = names ? String(gl?.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(renderer);
+}
+
 /** The picture: everything in the robot's base frame, z up, metres. Drawn when something changed. */
 export class View {
   /** A person moved an object; called for every movement. */
@@ -49,8 +58,9 @@ export class View {
   private focus = new THREE.Vector3(0.45, -0.1, 0.15);
 
   constructor(private readonly box: HTMLElement) {
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const slow = isSoftware();
+    this.renderer = new THREE.WebGLRenderer({ antialias: !slow, powerPreference: "high-performance" });
+    this.renderer.setPixelRatio(slow ? 1 : Math.min(devicePixelRatio, 2));
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     canvas.setAttribute("role", "application");
