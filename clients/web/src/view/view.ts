@@ -93,6 +93,7 @@ export class View {
     this.robot = await Robot.load(description, () => this.touch());
     this.scene.add(this.robot.group);
     this.focus.copy(this.robot.tool()).multiplyScalar(0.95);
+    this.focus.z -= 0.05;
     this.home();
     this.setGround();
     return this.robot.missing;
