@@ -281,10 +281,16 @@ int CommandLine::Run(int argc, char** argv) {
   try {
     app_->parse(std::move(words));
   } catch (const CLI::ParseError& error) {
-    // --help and --version.
-    if (error.get_exit_code() == 0) return app_->exit(error);
-    std::cerr << Explain(app_.get(), error) << "\nTry \"" << FullName(Deepest(app_.get()))
-              << " --help\".\n";
+    const CLI::App* app = Deepest(app_.get());
+    const std::vector<std::string> unknown = app->remaining();
+    // --help and --version; of a command that there is.
+    const bool mistyped = !unknown.empty() && !app->get_subcommands({}).empty();
+    if (error.get_exit_code() == 0 && !mistyped) return app_->exit(error);
+    if (error.get_exit_code() == 0) {
+      std::cerr << Unknown(app, unknown.front()) << '\n';
+      return kUsage;
+    }
+    std::cerr << Explain(app_.get(), error) << "\nTry \"" << FullName(app) << " --help\".\n";
     return kUsage;
   }
   return shared_->chosen ? shared_->chosen() : kUsage;

@@ -169,6 +169,18 @@ nlohmann::json ToJson(const Finding& finding) {
           {"participants", finding.participants}};
 }
 
+const char* NameOf(ircp::SeenParticipant::Trust trust) {
+  switch (trust) {
+    case ircp::SeenParticipant::Trust::kTrusted:
+      return "trusted";
+    case ircp::SeenParticipant::Trust::kRefused:
+      return "refused";
+    case ircp::SeenParticipant::Trust::kNotAsked:
+      break;
+  }
+  return "not_asked";
+}
+
 void PrintJson(const Evidence& evidence, const diagnosis::Diagnosis& diagnosis) {
   nlohmann::json participants = nlohmann::json::array();
   for (const ircp::SeenParticipant& one : evidence.discovery.participants) {
@@ -177,6 +189,7 @@ void PrintJson(const Evidence& evidence, const diagnosis::Diagnosis& diagnosis) 
                             {"domain", one.domain},
                             {"vendor", one.vendor},
                             {"secured", one.secured},
+                            {"trust", NameOf(one.trust)},
                             {"properties", one.properties}});
   }
   nlohmann::json flows = nlohmann::json::array();
@@ -220,15 +233,18 @@ void PrintText(const Evidence& evidence, const diagnosis::Diagnosis& diagnosis, 
                       one.secured ? "yes" : "no"});
   }
   std::cout << participants.Text();
-  if (all || !evidence.names.empty()) {
+  if (diagnosis.flows.empty()) {
+    std::cout << "no topic has a writer and a reader that hear each other\n";
+  } else if (all || !evidence.names.empty()) {
     Table flows({"TOPIC", "FROM", "TO"});
     for (const diagnosis::Flow& flow : diagnosis.flows) {
       flows.Add({flow.topic, exemplar::Join(flow.from, ", "), exemplar::Join(flow.to, ", ")});
     }
     std::cout << '\n' << flows.Text();
   } else {
-    std::cout << diagnosis.flows.size() << " topics have a writer and a reader that hear each "
-              << "other (--all lists them)\n";
+    std::cout << diagnosis.flows.size()
+              << (diagnosis.flows.size() == 1 ? " topic has" : " topics have")
+              << " a writer and a reader that hear each other (--all lists them)\n";
   }
   for (const Finding& finding : diagnosis.findings) {
     const Colour colour = finding.severity == Severity::kProblem   ? Colour::kRed
@@ -292,9 +308,11 @@ void AddDoctorCommand(Command& root, const Session& session) {
   const auto words = std::make_shared<Words>();
   Command command = root.Add(
       "doctor",
-      "Says why participants do not see or hear each other: domain, station, QoS, type, "
-      "security,\ntransport, clock, services. Looks around on this machine's network for some "
-      "seconds; exit code\n1 where it finds a problem. Names limit it to what concerns them",
+      "Says why participants do not see or hear each other\n\n"
+      "Domain, station, QoS, type, security, transport, clock, services. Looks around on this "
+      "machine's\nnetwork for some seconds; exit code 1 where it finds a problem. Names limit it "
+      "to "
+      "what concerns them.",
       {"exemplar doctor", "exemplar doctor exemplar-recorder exemplar-capture-suit --station lab",
        "exemplar doctor --server 127.0.0.1:50051 --service 127.0.0.1:50053 --format json"});
   command

@@ -134,8 +134,9 @@ int Execute(const Session& session, const Words& words) {
   const Result<api::ExecutionResult> result = clients->executor->Execute(
       *request,
       [&](const api::ExecutionFeedback& now) {
-        const double fraction = now.duration_s > 0 ? now.time_s / now.duration_s : 0;
-        display.Show(fraction, now.state,
+        // Before there is a plan, nothing else is known.
+        if (!(now.duration_s > 0)) return display.Show(0, now.state);
+        display.Show(now.time_s / now.duration_s, now.state,
                      FormatFixed(now.time_s, 1) + " of " + FormatFixed(now.duration_s, 1) +
                          " s, touch " + FormatFixed(now.touch_n, 1) + " N");
       },

@@ -17,9 +17,9 @@ std::string StatusText(const api::RobotStatus& status) {
   if (status.joints.size() == 0) {
     text += "joints  none received\n";
   } else {
-    text += "tool    " + PoseText(status.base_T_tool, true) + "\njoints  " +
+    text += "tool    " + PoseText(status.base_T_tool, true) + "  (m)\njoints  " +
             FormatFixed(status.state_age_s, 3) + " s old\n";
-    Table joints({"JOINT", "POSITION"});
+    Table joints({"JOINT", "RAD OR M"});
     for (std::size_t i = 0; i < status.joint_names.size(); ++i) {
       joints.Add(
           {status.joint_names[i], FormatFixed(status.joints[static_cast<Eigen::Index>(i)], 4)});

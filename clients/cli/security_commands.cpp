@@ -2,12 +2,14 @@
 // server is asked.
 
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "exemplar/base/clock.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/security/station.hpp"
 #include "exemplar/security/station_role.hpp"
+#include "screen.hpp"
 
 namespace exemplar::cli {
 namespace {
@@ -17,6 +19,7 @@ struct Words {
   std::string name;
   std::string station = "default";
   std::string role;
+  std::string format;
   std::vector<std::string> hosts;
   std::vector<std::string> calls;
   std::optional<double> days;
@@ -42,9 +45,14 @@ int Init(const Words& words) {
                              .days = words.days.value_or(security::InitRequest().days)},
                             SystemClock().Now());
   if (!made) return Fail(made.error());
-  std::cout << "authority of station " << words.station << ": " << words.folder
-            << "/authority (ca.key stays on this machine)\n"
-            << "access file for --access: " << words.folder << "/access.yaml\n";
+  const std::string authority = words.folder + "/authority";
+  const std::string access = words.folder + "/access.yaml";
+  if (words.format == "json") {
+    Print({{"station", words.station}, {"authority", authority}, {"access", access}});
+  } else {
+    std::cout << "authority of station " << words.station << ": " << authority
+              << " (ca.key stays on this machine)\naccess file for --access: " << access << '\n';
+  }
   return 0;
 }
 
@@ -62,6 +70,14 @@ int Issue(const Words& words) {
   const auto folder = security::IssueMember(request, SystemClock().Now());
   if (!folder) return Fail(folder.error());
   const security::MemberFiles files = security::FilesOf(*folder);
+  if (words.format == "json") {
+    Print({{"name", words.name},
+           {"security", folder->string()},
+           {"tls_cert", files.certificate.string()},
+           {"tls_key", files.key.string()},
+           {"tls_ca", files.authority.string()}});
+    return 0;
+  }
   std::cout << "--security " << folder->string() << " --tls-cert " << files.certificate.string()
             << " --tls-key " << files.key.string() << " --tls-ca " << files.authority.string()
             << '\n';
@@ -71,6 +87,10 @@ int Issue(const Words& words) {
 int Revoke(const Words& words) {
   const Status revoked = security::RevokeMember(words.folder, words.name, SystemClock().Now());
   if (!revoked) return Fail(revoked.error());
+  if (words.format == "json") {
+    Print({{"revoked", words.name}});
+    return 0;
+  }
   std::cout << words.name << " is revoked: copy access.yaml, and crl.pem of each member's folder, "
             << "to their machines.\nServers take access.yaml at once; programs with --security "
             << "read crl.pem when they start again.\n";
@@ -84,16 +104,31 @@ int Token(const Words& words) {
   const Result<std::string> token = security::AddToken(
       words.folder, words.name, *roles, words.days.value_or(kDays), SystemClock().Now());
   if (!token) return Fail(token.error());
-  std::cout << *token << '\n';
+  if (words.format == "json") {
+    Print({{"name", words.name}, {"token", *token}});
+  } else {
+    std::cout << *token << '\n';
+  }
   return 0;
 }
 
 int List(const Words& words) {
   const auto members = security::ListMembers(words.folder);
   if (!members) return Fail(members.error());
+  nlohmann::json list = nlohmann::json::array();
+  Table table({"MEMBER", "ROLE", "UNTIL", "SERIAL"});
   for (const security::MemberInfo& member : *members) {
-    std::cout << member.name << "  " << member.role << "  until "
-              << ToIso8601(member.not_after).substr(0, 19) << "Z  serial " << member.serial << '\n';
+    const std::string until = ToIso8601(member.not_after).substr(0, 19) + "Z";
+    list.push_back({{"name", member.name},
+                    {"role", member.role},
+                    {"until", until},
+                    {"serial", member.serial}});
+    table.Add({member.name, member.role, until, member.serial});
+  }
+  if (words.format == "json") {
+    Print(list);
+  } else {
+    std::cout << table.Text();
   }
   return 0;
 }
@@ -108,6 +143,7 @@ void AddSecurityCommands(Command& root) {
     const auto words = std::make_shared<Words>();
     Command command = group.Add(name, summary, examples);
     command.Argument("FOLDER", words->folder, "of the station's files").Completes(Names::kFolders);
+    AddFormat(command, words->format, {"text", "json"});
     command.Runs([words, action] { return action(*words); });
     return std::pair{command, words};
   };

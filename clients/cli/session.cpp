@@ -28,6 +28,11 @@ std::string_view RemedyOf(const Error& error) {
     case ErrorCode::kPermissionDenied:
       return "whoever keeps the station's files makes a token that has the role:\n"
              "  exemplar security token FOLDER NAME --role ROLE";
+    case ErrorCode::kUnavailable:
+      if (!error.message.starts_with("no answer from ")) return {};
+      return "does it run there? --server HOST:PORT or EXEMPLAR_SERVER names another; what is "
+             "wrong "
+             "on the way:\n  exemplar doctor --server HOST:PORT";
     default:
       return {};
   }
@@ -68,6 +73,10 @@ int Fail(const Error& error) {
 int FailUsage(const Error& error) {
   Fail(error);
   return kUsage;
+}
+
+void Hint(const std::string& text) {
+  if (IsTerminal(STDOUT_FILENO)) std::cerr << text << '\n';
 }
 
 void Warn(const std::vector<std::string>& warnings) {

@@ -32,6 +32,8 @@ struct Session {
 int Fail(const Error& error);
 /// The same for words of the command line that cannot be meant.
 int FailUsage(const Error& error);
+/// A line to a person at a terminal, on stderr; nothing in a pipe.
+void Hint(const std::string& text);
 /// "exemplar: warning: ..." on stderr, one a line.
 void Warn(const std::vector<std::string>& warnings);
 

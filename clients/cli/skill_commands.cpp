@@ -56,6 +56,9 @@ int List(const Session& session, const Words& words) {
     Print(list);
     return 0;
   }
+  if (skills->empty()) {
+    Hint("no skills yet: `exemplar trial submit --skill NAME FILE...`, then `skill learn NAME`");
+  }
   Table table({"SKILL", "VERSION", "VERSIONS", "METHOD", "TARGET", "TRIALS", "LEARNED"});
   for (const api::SkillInfo& info : *skills) {
     table.Add({info.name, std::to_string(info.version), std::to_string(info.versions), info.method,
@@ -120,14 +123,26 @@ int Rollback(const Session& session, const Words& words) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
   const Status done = clients->skills->Rollback(words.name, words.version);
-  return done ? 0 : Fail(done.error());
+  if (!done) return Fail(done.error());
+  if (words.format == "json") {
+    Print({{"skill", words.name}, {"version", words.version}});
+  } else {
+    std::cout << "skill " << words.name << ": version " << words.version << " is the current one\n";
+  }
+  return 0;
 }
 
 int Delete(const Session& session, const Words& words) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
   const Status done = clients->skills->Delete(words.name);
-  return done ? 0 : Fail(done.error());
+  if (!done) return Fail(done.error());
+  if (words.format == "json") {
+    Print({{"deleted", words.name}});
+  } else {
+    std::cout << "skill " << words.name << " is deleted; its trials stay\n";
+  }
+  return 0;
 }
 
 int Export(const Session& session, const Words& words) {
@@ -207,11 +222,13 @@ void AddSkillCommands(Command& root, const Session& session) {
   command = AddOne(skill, "rollback", "Makes another version the current one; nothing is lost",
                    {"exemplar skill rollback press --version 1"}, words);
   command.Option("--version", "N", words->version, "as versions lists them").Required();
+  AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] { return Rollback(session, *words); });
 
   words = std::make_shared<Words>();
   command = AddOne(skill, "delete", "Deletes a skill with all of its versions; its trials stay",
                    {"exemplar skill delete press"}, words);
+  AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] { return Delete(session, *words); });
 
   words = std::make_shared<Words>();

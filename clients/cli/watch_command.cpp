@@ -8,6 +8,7 @@
 
 #include "commands.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/bus/codec.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "gateway/topic_server.hpp"
 #include "network_options.hpp"
@@ -43,7 +44,8 @@ class Source {
     if (!participant) return participant.error();
     source->participant_ = std::move(*participant);
     auto hub =
-        gateway::TopicHub::Create(*source->participant_, *source->participant_, source->clock_, {});
+        gateway::TopicHub::Create(*source->participant_, *source->participant_, source->clock_,
+                                  {.decode_status = bus::Decode<ircp::StatusSample>});
     if (!hub) return hub.error();
     source->hub_ = std::move(*hub);
     source->server_ =
@@ -238,9 +240,9 @@ void AddWatchCommand(Command& root, const Session& session) {
   const auto words = std::make_shared<Words>();
   Command command = root.Add(
       "watch",
-      "Shows a station's topics as they flow: rates, losses and writers of all of them, or the\n"
-      "samples of those that are named. Through the gateway that --server or EXEMPLAR_SERVER "
-      "names;\nwithout one, or with --domain or --station, on the network itself",
+      "Shows a station's topics as they flow, or the samples of those that are named\n\n"
+      "Of topics: rates, losses and writers. Through the gateway that --server or EXEMPLAR_SERVER\n"
+      "names; without one, or with --domain or --station, on the network itself.",
       {"exemplar watch", "exemplar watch ircp/joint_state --rate 2 --format json",
        "exemplar watch --domain 3 --station lab 'ircp/*'"});
   command.OptionalArguments("TOPIC", words->topics,

@@ -67,11 +67,11 @@ def run(*words, server=None, env=None):
 class Learning:
     """exemplar-learning on a port of its own choice."""
 
-    def __init__(self, folder):
-        self.port_file = folder / "port"
+    def __init__(self, folder, *words, data="data"):
+        self.port_file = folder / f"port-{data}"
         self.port_file.unlink(missing_ok=True)
         self.log = open(folder / "learning.log", "ab")
-        command = [BINARIES / "exemplar-learning", "--listen", "127.0.0.1:0", "--port-file", self.port_file, "--data-dir", folder / "data"]
+        command = [BINARIES / "exemplar-learning", "--listen", "127.0.0.1:0", "--port-file", self.port_file, "--data-dir", folder / data, *words]
         self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stderr=self.log)
         deadline = time.monotonic() + 20
         while not self.port_file.exists():
@@ -101,12 +101,22 @@ class WordsTest(unittest.TestCase):
                 self.assertIn("Usage: exemplar " + group + " " + name, done.stdout)
                 self.assertIn("Examples:\n  exemplar " + group + " " + name, done.stdout)
 
+    def test_help_is_a_word_as_well(self):
+        self.assertEqual(run("help", "skill", "learn").stdout, run("skill", "learn", "--help").stdout)
+        self.assertEqual(run("help").stdout, run("--help").stdout)
+
+    def test_the_overview_says_a_whole_sentence_of_each_command(self):
+        for line in run("--help").stdout.partition("Subcommands:")[2].partition("Examples:")[0].splitlines():
+            self.assertNotRegex(line, r"(,| or| the| and)$")
+
     def test_version_is_one_line(self):
         self.assertRegex(run("--version").stdout, r"^exemplar \d+\.\d+\.\d+\n$")
 
     def test_bad_usage_is_said_on_stderr_with_code_2(self):
         for words, said in [
             ([], "which command?"),
+            (["help", "skil"], 'did you mean "skill"?'),
+            (["skill", "lern", "--help"], 'did you mean "learn"?'),
             (["skil", "list"], 'did you mean "skill"?'),
             (["skill", "lern", "press"], 'did you mean "learn"?'),
             (["skill", "learn"], "NAME is required"),
@@ -138,7 +148,8 @@ class WordsTest(unittest.TestCase):
         for words in (["skill", "list"], ["robot", "status"], ["record", "stop"], ["skill", "learn", "press"]):
             done = run("--server", "127.0.0.1:1", *words)
             self.assertEqual((done.returncode, done.stdout), (UNAVAILABLE, ""))
-            self.assertIn("127.0.0.1:1", done.stderr)
+            self.assertIn("no answer from 127.0.0.1:1: nobody listens there", done.stderr)
+            self.assertIn("exemplar doctor --server", done.stderr)
 
     def test_a_file_that_is_not_there_is_code_3(self):
         for words in (["trial", "submit", "--skill", "a", "none.csv"], ["trial", "segments", "none.csv"], ["skill", "evaluate", "a", "none.csv"], ["record", "info", "none.mcap"]):
@@ -433,6 +444,63 @@ class ServiceTest(unittest.TestCase):
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=20)
         self.assertEqual(done.returncode, REFUSED)
         self.assertIn("in use", done.stderr)
+
+
+class SecuredTest(unittest.TestCase):
+    """A service that wants TLS and tokens: who is refused is told why, and what helps."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-cli-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.station = cls.folder / "station"
+        cls.security("init", "--station", "test")
+        issued = cls.security("issue", "learning", "--role", "learning", "--format", "json")
+        cls.token = cls.security("token", "ben", "--role", "observe", "--format", "json")["token"]
+        cls.ca = issued["tls_ca"]
+        tls = ["--tls-cert", issued["tls_cert"], "--tls-key", issued["tls_key"], "--access", cls.station / "access.yaml"]
+        cls.learning = Learning(cls.folder, *tls)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.learning.end()
+
+    @classmethod
+    def security(cls, command, *words):
+        done = run("security", command, cls.station, *words)
+        assert done.returncode == DONE, done.stderr
+        return json.loads(done.stdout) if "json" in words else done.stdout
+
+    def exemplar(self, *words, token=None):
+        secret = self.folder / "token"
+        secret.write_text(token or "")
+        return run("--tls-ca", self.ca, *(["--token", f"@{secret}"] if token else []), *words, server=self.learning.address)
+
+    def test_who_shows_nothing_or_what_is_not_known_is_told_how_to_get_a_token(self):
+        for token, said in ((None, "wants a token"), ("exm_guess", "not known")):
+            done = self.exemplar("skill", "list", token=token)
+            self.assertEqual((done.returncode, done.stdout), (REFUSED, ""))
+            self.assertIn(said, done.stderr)
+            self.assertIn("exemplar security token", done.stderr)
+
+    def test_who_lacks_a_role_is_told_which(self):
+        self.assertEqual(self.exemplar("skill", "list", token=self.token).returncode, DONE)
+        for words in (["skill", "learn", "press"], ["skill", "delete", "press"], ["trial", "delete", "trial-0"]):
+            done = self.exemplar(*words, token=self.token)
+            self.assertEqual((done.returncode, done.stdout), (REFUSED, ""))
+            self.assertRegex(done.stderr, r"ben may not call \S+: that takes the role \w+, and ben has observe")
+            self.assertIn("exemplar security token FOLDER NAME --role ROLE", done.stderr)
+
+    def test_plain_text_gets_no_answer_and_a_hint(self):
+        done = run("skill", "list", server=self.learning.address)
+        self.assertEqual(done.returncode, UNAVAILABLE)
+        self.assertIn("--tls-ca", done.stderr)
+
+    def test_members_are_listed_for_people_and_for_scripts(self):
+        self.assertEqual([one["name"] for one in self.security("list", "--format", "json")], ["learning"])
+        self.assertRegex(self.security("list"), r"(?m)^learning +learning +20")
+        self.security("token", "carl", "--role", "observe")
+        self.assertEqual(self.security("revoke", "carl", "--format", "json"), {"revoked": "carl"})
 
 
 if __name__ == "__main__":

@@ -85,6 +85,18 @@ TEST(CallStatus, ANameThatANewerServerGaveFallsBackToGrpcsCode) {
   }
 }
 
+TEST(CallStatus, AConnectionThatCouldNotBeMadeIsToldInFewWords) {
+  const Error error =
+      FromGrpc({StatusCode::UNAVAILABLE,
+                "failed to connect to all addresses; last error: UNKNOWN: ipv4:127.0.0.1:9: Failed "
+                "to connect to remote host: Connection refused"},
+               "127.0.0.1:9");
+  EXPECT_EQ(error.message, "no answer from 127.0.0.1:9: nobody listens there");
+  EXPECT_EQ(PlainReason("DNS resolution failed for nohost:1: C-ares status is not ARES_SUCCESS"),
+            "no machine of that name is known");
+  EXPECT_EQ(PlainReason("of no known kind"), "of no known kind");
+}
+
 TEST(CallStatus, DetailsThatAreNoneOfOursAreLeftAside) {
   for (const std::string& details : {std::string("\xff\xff\xff"), std::string(100, '\x0a')}) {
     const Error error = FromGrpc({StatusCode::PERMISSION_DENIED, "no", details}, "lab:50051");

@@ -94,7 +94,7 @@ std::string MessageOf(const grpc::Status& status, const std::string& address) {
   const std::string& said = status.error_message();
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:
-      return "no answer from " + address + ": " + said + HintOf(said);
+      return "no answer from " + address + ": " + PlainReason(said) + HintOf(said);
     case grpc::StatusCode::DEADLINE_EXCEEDED:
       return address + " did not answer in time";
     case grpc::StatusCode::CANCELLED:
@@ -107,6 +107,21 @@ std::string MessageOf(const grpc::Status& status, const std::string& address) {
 }
 
 }  // namespace
+
+std::string PlainReason(const std::string& said) {
+  struct Reason {
+    const char* words;
+    const char* plainly;
+  };
+  for (const Reason& reason : {Reason{"DNS resolution failed", "no machine of that name is known"},
+                               Reason{"Connection refused", "nobody listens there"},
+                               Reason{"No route to host", "there is no way to that machine"},
+                               Reason{"Network is unreachable", "there is no way to that network"},
+                               Reason{"Connection timed out", "that machine does not answer"}}) {
+    if (said.find(reason.words) != std::string::npos) return reason.plainly;
+  }
+  return said;
+}
 
 grpc::Status ToGrpc(const Status& status) {
   if (status) return grpc::Status::OK;

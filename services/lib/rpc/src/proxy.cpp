@@ -240,7 +240,7 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Proxy::Relay(
                                       return status;
                                     }
                                     return ToGrpc(Unavailable(link.place() + " does not answer: " +
-                                                              status.error_message()));
+                                                              PlainReason(status.error_message())));
                                   },
                               .on_done =
                                   [this, mark](const grpc::Status& status) {
