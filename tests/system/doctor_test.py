@@ -1,6 +1,6 @@
 """`exemplar doctor` and `exemplar watch` on real programs: each kind of mismatch is made for real, and the verdict read.
 
-Runs in a network namespace of its own (made by run_isolated).
+Each test runs in a network namespace of its own, several at once.
 """
 
 import json
@@ -15,6 +15,7 @@ import tempfile
 import time
 import unittest
 
+import side_by_side
 from processes import BINARIES, ROOT, Programs, wait_for
 
 ROBOT = ROOT / "deploy" / "models" / "arm7"
@@ -34,7 +35,7 @@ def doctor(*words):
     """Exit code and report."""
     seconds = () if "--seconds" in words else ("--seconds", 2.5)
     done = run("doctor", *words, *seconds, "--format", "json")
-    assert done.returncode in (0, 1), done.stderr
+    assert done.returncode in (0, 1) and done.stdout, f"exit {done.returncode}: {done.stdout}{done.stderr}"
     return done.returncode, json.loads(done.stdout)
 
 
@@ -79,7 +80,7 @@ class HealthyTest(Case):
         self.driver()
         self.address = self.executor()
 
-    def test_a_station_that_is_well_gets_no_problem_and_its_topics_are_watched(self):
+    def test_a_station_that_is_well_gets_no_problem(self):
         code, found = doctor(*HERE, "--service", self.address)
         problems = [finding for finding in found["findings"] if finding["severity"] == "problem"]
         self.assertEqual((code, problems), (0, []))
@@ -89,26 +90,25 @@ class HealthyTest(Case):
         self.assertEqual((flows["ircp/joint_state"]["from"], flows["ircp/joint_state"]["to"]), ([DRIVER], [EXECUTOR]))
         self.assertEqual(found["services"], [{"address": self.address, "reachable": True, "serving": True}])
 
-        # What concerns two of them; and names that are none.
+    def test_names_limit_it_and_are_suggested(self):
         code, found = doctor("reference-driver", "executor", *HERE)
         self.assertEqual(code, 0, found)
         problem = self.assert_problem(doctor("exemplar-reference-drive", EXECUTOR, *HERE), "participant", "exemplar-reference-drive")
         self.assertIn(f'"{DRIVER}"', problem["remedy"])
         self.assert_problem(doctor(*HERE, "--service", "127.0.0.1:1"), "service", "127.0.0.1:1")
-        # Asked in a place where nobody is.
+
+    def test_asked_in_a_place_where_nobody_is_it_says_where_they_are(self):
         self.assert_problem(doctor("--domain", 62, "--station", "test"), "domain", "domain 61, not in 62", EXECUTOR)
         self.assert_problem(doctor("--domain", 61, "--station", "tset"), "station", '"tset"', '"test"')
 
-        # For people: no colours in a pipe.
+    def test_people_get_text_without_colours_in_a_pipe(self):
         text = run("doctor", *HERE, "--seconds", 2, "--all")
         self.assertEqual(text.returncode, 0)
         self.assertIn("no problem found", text.stdout)
         self.assertRegex(text.stdout, rf"(?m)^ircp/joint_state +{DRIVER} +{EXECUTOR}$")
         self.assertNotIn("\033", text.stdout + text.stderr)
 
-        self.watch()
-
-    def watch(self):
+    def test_topics_are_watched(self):
         table = run("watch", *HERE, "--count", 4, "--format", "json")
         self.assertEqual(table.returncode, 0, table.stderr)
         lines = [json.loads(line) for line in table.stdout.splitlines()]
@@ -119,6 +119,7 @@ class HealthyTest(Case):
         plain = run("watch", *HERE, "--count", 4)  # not every writer need be known in the first second
         self.assertRegex(plain.stdout, r"(?m)^\S+Z ircp/joint_state [\d.]+ Hz, \d+ received, 0 lost, 1 writer, ")
 
+    def test_samples_are_watched(self):
         samples = run("watch", "ircp/joint_state", *HERE, "--count", 3, "--format", "json")
         self.assertEqual(samples.returncode, 0, samples.stderr)
         shown = [json.loads(line) for line in samples.stdout.splitlines()]
@@ -158,13 +159,13 @@ class MismatchTest(Case):
         self.assertEqual((problem["policy"], problem["topic"]), ("reliability", "ircp/joint_state"))
         self.assertIn("--best-effort", problem["remedy"])
 
-    def replay(self, type_name, schema):
-        """Writes another type on ircp/joint_state: a recording that somebody made elsewhere, played for 20 s."""
+    def replay(self, type_name, schema, topic="ircp/joint_state"):
+        """Writes a type on a topic: a recording that somebody made elsewhere, played for 20 s."""
         text = lambda word: struct.pack("<I", len(word)) + word.encode()
         record = lambda opcode, data: struct.pack("<BQ", opcode, len(data)) + data
         out = b"\x89MCAP0\r\n" + record(1, text("") + text("a test"))
         out += record(3, struct.pack("<H", 1) + text(type_name) + text("omgidl") + text(schema))
-        out += record(4, struct.pack("<HH", 1, 1) + text("ircp/joint_state") + text("cdr") + struct.pack("<I", 0))
+        out += record(4, struct.pack("<HH", 1, 1) + text(topic) + text("cdr") + struct.pack("<I", 0))
         for i in range(3):
             now = 1_700_000_000_000_000_000 + i * 10_000_000_000
             out += record(5, struct.pack("<HIQQ", 1, i, now, now) + struct.pack("<II", 0x100, i))
@@ -172,7 +173,7 @@ class MismatchTest(Case):
         # Cut within its last record: `record recover` makes it whole.
         file.write_bytes(out[:-5])
         self.assertEqual(run("record", "recover", file).returncode, 0)
-        self.programs.start("exemplar", "record", "replay", file.with_suffix(".recovered.mcap"), "--topic", "ircp/joint_state", "--wait", "0.1")
+        self.programs.start("exemplar", "record", "replay", file.with_suffix(".recovered.mcap"), "--topic", topic, "--wait", "0.1")
 
     def test_types_that_differ_are_named(self):
         self.executor()
@@ -183,6 +184,39 @@ class MismatchTest(Case):
         self.executor()
         self.replay("exemplar::ircp::v1::JointState", "module exemplar { module ircp { module v1 { struct JointState { @key long n; }; }; }; };")
         self.assert_problem(doctor(*HERE), "type", EXECUTOR)
+
+    def test_a_topic_that_is_nearly_the_one_is_named(self):
+        self.executor()
+        self.replay("exemplar::ircp::v1::JointState", "struct Other { long n; };", topic="ircp/joint_stat")
+        problem = self.assert_problem(doctor(*HERE), "topic", "ircp/joint_state", '"ircp/joint_stat"')
+        self.assertIn(EXECUTOR, problem["participants"])
+
+    def members(self, station, **roles):
+        """Their folders, for --security."""
+        folder = self.folder / station
+        self.assertEqual(run("security", "init", folder, "--station", "test").returncode, 0)
+        for name, role in roles.items():
+            self.assertEqual(run("security", "issue", folder, name, "--role", role).returncode, 0)
+        return [folder / "members" / name for name in roles]
+
+    def test_one_with_an_identity_beside_one_without_is_named(self):
+        (robot,) = self.members("lab", robot="robot")
+        self.driver("--security", robot)
+        self.executor()
+        self.assert_problem(doctor(*HERE, "--seconds", 4), "security", DRIVER, EXECUTOR, "identity")
+
+    def test_identities_of_two_authorities_are_named(self):
+        (robot,) = self.members("lab", robot="robot")
+        executor, observer = self.members("hall", executor="executor", doctor="observer")
+        self.driver("--security", robot)
+        self.executor("--security", executor)
+        _, found = doctor(*HERE, "--seconds", 6, "--security", observer)
+        trust = {one["name"]: one["trust"] for one in found["participants"]}
+        self.assertEqual(trust[EXECUTOR], "trusted", found)
+        self.assertNotEqual(trust[DRIVER], "trusted", found)
+        told = [finding for finding in found["findings"] if finding["cause"] == "security"]
+        self.assertEqual([finding["participants"] for finding in told], [[DRIVER]], found)
+        self.assertIn("authority", told[0]["what"])
 
     @unittest.skipUnless(FAKETIME.exists(), "faketime is not installed")
     def test_a_clock_that_is_wrong_is_named(self):
@@ -247,4 +281,4 @@ class AloneTest(Case):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    side_by_side.main(__file__)

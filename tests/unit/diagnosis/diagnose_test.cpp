@@ -143,6 +143,20 @@ TEST_F(DiagnoseTest, TellsThatAnIdentityWasRefused) {
   ExpectProblem("security", "refuse each other");
 }
 
+TEST_F(DiagnoseTest, WarnsOfOneThatDidNotAnswerASecuredGreeting) {
+  evidence_.secured = true;
+  for (SeenParticipant& one : evidence_.discovery.participants) {
+    one.secured = true;
+    one.trust = SeenParticipant::Trust::kTrusted;
+  }
+  EXPECT_TRUE(Diagnose(evidence_).findings.empty());
+  evidence_.discovery.participants[1].trust = SeenParticipant::Trust::kNotAsked;
+  const Finding finding = First();
+  EXPECT_EQ(finding.severity, Severity::kWarning);
+  EXPECT_EQ(finding.cause, "security");
+  EXPECT_EQ(finding.participants, std::vector<std::string>{"exemplar-recorder"});
+}
+
 TEST_F(DiagnoseTest, TellsThatNoDatagramReachesSomebody) {
   evidence_.reachability = {{.participant = "id of exemplar-recorder",
                              .reachable = false,

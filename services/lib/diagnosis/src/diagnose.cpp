@@ -140,6 +140,16 @@ class Judge {
              "clocks of the machines.",
              {names_.Of(one->id)});
       }
+      // A refusal need not be told to the one who is refused: he only waits.
+      if (evidence_.secured && one->secured && one->trust == SeenParticipant::Trust::kNotAsked) {
+        Tell(Severity::kWarning, "security",
+             names_.Of(one->id) +
+                 " has not answered this observer's greeting: its identity is of another "
+                 "authority, or it is slow",
+             "Look longer (--seconds); if it stays so, issue both identities with the same "
+             "authority (exemplar security).",
+             {names_.Of(one->id)});
+      }
     }
     if (secured.empty()) return;
     std::vector<std::string> names = NamesOf(secured);
