@@ -14,6 +14,7 @@ import time
 import unittest
 
 import processes
+import side_by_side
 import trials
 from processes import exemplar, wait_for
 
@@ -337,4 +338,4 @@ class SlowNetworkTest(NetworkCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    side_by_side.main(__file__)

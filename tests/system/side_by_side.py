@@ -18,11 +18,14 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 def main(file):
-    """Without arguments all tests of `file`, each by itself; with some, these, here."""
-    if len(sys.argv) > 1:
+    """All tests of `file`, or of the classes that are named, each by itself; tests that are named (Class.test) run here."""
+    if any("." in word or word.startswith("-") for word in sys.argv[1:]):
         own_shared_memory()
         unittest.main()
     names = [name.removeprefix("__main__.") for name in ids(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"]))]
+    if sys.argv[1:]:
+        names = [name for name in names if name.split(".")[0] in sys.argv[1:]]
+        assert names, f"no test of {sys.argv[1:]} in {file}"
     with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
         failed = [name for name, passed in pool.map(lambda name: run(file, name), names) if not passed]
     print(f"{len(names)} tests, {len(failed)} failed{': ' if failed else ''}{', '.join(failed)}", flush=True)
