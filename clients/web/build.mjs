@@ -1,7 +1,7 @@
 // Builds the page: node build.mjs [--out DIR]   (default ../../build/web)
 // Runs the unit tests: node build.mjs --tests
 import { execFileSync } from "node:child_process";
-import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -14,8 +14,9 @@ const shared = { bundle: true, format: "esm", target: "es2022", logLevel: "warni
 async function buildPage(out) {
   rmSync(out, { recursive: true, force: true });
   mkdirSync(out, { recursive: true });
-  await build({ ...shared, entryPoints: { app: "src/main.ts" }, outdir: out, minify: true, legalComments: "external" });
+  await build({ ...shared, entryPoints: { app: "src/main.ts" }, outdir: out, minify: true, legalComments: "none" });
   for (const name of ["index.html", "favicon.svg"]) copyFileSync(join(here, name), join(out, name));
+  writeFileSync(join(out, "licenses.txt"), licenses());
   for (const name of readdirSync(out)) {
     if (!/\.(js|css|html)$/.test(name)) continue;
     const bytes = readFileSync(join(out, name));
@@ -23,6 +24,18 @@ async function buildPage(out) {
     writeFileSync(join(out, `${name}.gz`), packed);
     console.log(`${name}: ${bytes.length} bytes, ${packed.length} packed`);
   }
+}
+
+/** Of what is bundled: whoever passes the page on has to pass these on as well. */
+function licenses() {
+  const texts = [];
+  for (const name of ["three", "urdf-loader", "uplot"]) {
+    const folder = join(here, "node_modules", name);
+    const { version, license } = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
+    const file = ["LICENSE", "LICENSE.md"].map((one) => join(folder, one)).find(existsSync);
+    texts.push(`${name} ${version} (${license})\n\n${file === undefined ? "https://www.apache.org/licenses/LICENSE-2.0" : readFileSync(file, "utf8")}`);
+  }
+  return texts.join("\n----\n\n");
 }
 
 async function runTests() {

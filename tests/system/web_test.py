@@ -71,7 +71,7 @@ class WebTest(unittest.TestCase):
         cls.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", cls.scene, "--cameras", "off", "--track-hz", "20", "--log-format", "json")
         _, cls.recorder = cls.programs.recorder()
         _, cls.learning = cls.server("exemplar-learning", "--data-dir", cls.folder / "skills", "--robot", ROBOT, bus=False)
-        _, cls.executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", cls.scene, "--learning", cls.learning)
+        cls.executor_program, cls.executor = cls.server(*cls.executor_words())
         cls.gateway, cls.address, cls.port = cls.start_gateway("127.0.0.1:0")
         cls.files = trials.write_set(cls.folder / "trials", BUTTONS)
         exemplar("--server", cls.address, "trial", "submit", "--skill", "press", *cls.files)
@@ -83,9 +83,13 @@ class WebTest(unittest.TestCase):
         cls.page("grows", name="answers", than=0)
 
     @classmethod
-    def server(cls, program, *words, bus=True):
+    def executor_words(cls):
+        return "exemplar-executor", "--robot", ROBOT, "--scene", cls.scene, "--learning", cls.learning
+
+    @classmethod
+    def server(cls, program, *words, bus=True, listen="127.0.0.1:0"):
         port_file = cls.folder / f"port-{len(cls.programs.running)}"
-        process = cls.programs.start(program, "--listen", "127.0.0.1:0", "--port-file", port_file, *words, bus=bus)
+        process = cls.programs.start(program, "--listen", listen, "--port-file", port_file, *words, bus=bus)
         wait_for(lambda: port_file.exists() and port_file.read_text().strip(), f"the port of {program}")
         return process, "127.0.0.1:" + port_file.read_text().strip().rsplit(":", 1)[-1]
 
@@ -232,6 +236,16 @@ class WebTest(unittest.TestCase):
         page("hides", of="#banner")
         seen = float(page("data")["samples"])
         page("grows", name="samples", than=seen + 30)
+        self.assertNotIn("does not answer", page("text", of="#services"))
+
+    def test_a_service_that_is_gone_is_named_until_it_is_back(self):
+        page = self.page
+        self.executor_program.send_signal(signal.SIGTERM)
+        self.executor_program.wait(20)
+        page("says", of="#services", text="executor does not answer")
+        page("says", of="#robot-detail", text="The executor does not answer")
+        type(self).executor_program, _ = self.server(*self.executor_words(), listen=self.executor)
+        page("says", of="#robot-state", text="idle")
         self.assertNotIn("does not answer", page("text", of="#services"))
 
     def test_nothing_is_loaded_from_elsewhere_and_no_script_failed(self):
