@@ -219,13 +219,15 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Proxy::Relay(
     return RefuseCall(ToGrpc(full));
   }
   std::map<std::string, std::string> metadata{{kRequestIdKey, mark.request_id()}};
-  if (link.speaks_for_others && !admission.caller.empty()) {
+  const bool in_his_name = link.speaks_for_others && !admission.caller.empty();
+  if (in_his_name) {
     metadata[kForWhomKey] = admission.caller.substr(0, admission.caller.find(" via "));
   }
   return StartRelay(context, {.method = "/" + std::string(method),
                               .connection = link.connection,
                               .metadata = std::move(metadata),
-                              .pass_authorization = link.may_hear_secrets,
+                              // With his token it would be he who speaks for himself.
+                              .pass_authorization = link.may_hear_secrets && !in_his_name,
                               .stop = shared_.shutdown().get_token(),
                               .translate =
                                   [this, &link](const grpc::Status& status) {
