@@ -9,6 +9,7 @@
 
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/security/station.hpp"
+#include "greeting_guard.hpp"
 #include "support/dds_domain.hpp"
 #include "support/eventually.hpp"
 
@@ -104,6 +105,8 @@ TEST_F(BusSecurityTest, MembersHearEachOtherAndTheRecordersTapHearsAll) {
   ASSERT_TRUE(writer->Write(Suit()).ok());
   EXPECT_TRUE(Eventually([&] { return heard.count == 1 && taped == 1; }));
 }
+
+TEST_F(BusSecurityTest, GreetingsOfNewcomersTakeTurns) { EXPECT_TRUE(GreetingsAreGuarded()); }
 
 TEST_F(BusSecurityTest, StrangersNeitherReadNorWrite) {
   const auto capture = JoinAs("capture");

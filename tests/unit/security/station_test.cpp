@@ -122,6 +122,17 @@ TEST_F(StationTest, RevokedMembersStandOnEveryListAndHaveNoAccess) {
   EXPECT_EQ(RevokeMember(folder_, "gateway", now_).error().code, ErrorCode::kNotFound);
 }
 
+TEST_F(StationTest, ThoseThatAreCalledHaveTheAccessFileAndItsChanges) {
+  const auto recorder = Issue("recorder", "recorder");
+  const auto robot = Issue("robot", "robot");
+  ASSERT_TRUE(AddToken(folder_, "ben", {Role::kRecord}, 1, now_).ok());
+  EXPECT_EQ(Text(recorder / "access.yaml"), Text(folder_ / "access.yaml"));
+  EXPECT_THAT(Text(recorder / "access.yaml"), HasSubstr("name: ben"));
+  EXPECT_FALSE(std::filesystem::exists(robot / "access.yaml"));
+  ASSERT_TRUE(RevokeMember(folder_, "ben", now_).ok());
+  EXPECT_EQ(Text(recorder / "access.yaml").find("ben"), std::string::npos);
+}
+
 TEST_F(StationTest, IssuingAgainRevokesTheOldCertificate) {
   Issue("executor", "executor");
   const std::string old = ListMembers(folder_)->front().serial;

@@ -192,6 +192,21 @@ Status Secure(const ParticipantOptions& options, dds::DomainParticipantQos& qos)
   return {};
 }
 
+/// Ends the program when somebody else is revoked: whoever starts it again, does so with the list as
+/// it then is. Null for an open participant.
+std::shared_ptr<RevocationWatch> WatchRevocations(const ParticipantOptions& options) {
+  if (options.security.empty()) return nullptr;
+  return std::make_shared<RevocationWatch>(RevocationWatch::Options{
+      .list = security::FilesOf(options.security).revocations,
+      .on_revoked = [log = options.log](const std::string& serial) {
+        if (log != nullptr) {
+          log->Warning("ending: a member was revoked, and who starts again refuses it",
+                       {{"serial", serial}});
+        }
+        EndProcess();
+      }});
+}
+
 }  // namespace
 
 BytesType::BytesType(const std::string& type_name, bool keyed) {
@@ -299,7 +314,7 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
     return Unavailable("Fast DDS made no participant in domain " + std::to_string(options.domain) +
                        ": " + others);
   }
-  return ParticipantPtr(participant);
+  return ParticipantPtr(participant, ParticipantDeleter{.watch = WatchRevocations(options)});
 }
 
 Result<dds::Topic*> MakeTopic(dds::DomainParticipant& participant, const std::string& topic,

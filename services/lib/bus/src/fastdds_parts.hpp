@@ -13,6 +13,7 @@
 #include <string>
 
 #include "byte_endpoints.hpp"
+#include "revocation_watch.hpp"
 
 namespace exemplar::bus {
 
@@ -36,6 +37,7 @@ class BytesType final : public dds::TopicDataType {
 /// Deletes a participant with all that it holds.
 struct ParticipantDeleter {
   void operator()(dds::DomainParticipant* participant) const;
+  std::shared_ptr<RevocationWatch> watch = {};  ///< of a secured one
 };
 using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
 

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <openssl/pem.h>
 
+#include <algorithm>
 #include <array>
 #include <ctime>
 #include <fstream>
@@ -33,6 +34,12 @@ std::string PemOf(X509& certificate) {
 std::string PemOf(EVP_PKEY& key) {
   const BioPtr bio = WriteBio();
   PEM_write_bio_PrivateKey(bio.get(), &key, nullptr, nullptr, 0, nullptr, nullptr);
+  return TextOf(bio.get());
+}
+
+std::string SerialOf(const ASN1_INTEGER* serial) {
+  const BioPtr bio = WriteBio();
+  i2a_ASN1_INTEGER(bio.get(), serial);
   return TextOf(bio.get());
 }
 
@@ -129,9 +136,7 @@ Result<CertificateFacts> ReadCertificate(const std::string& pem, const std::stri
   const BioPtr text = WriteBio();
   X509_NAME_print_ex(text.get(), subject, 0, XN_FLAG_RFC2253);
   facts.subject = TextOf(text.get());
-  const BioPtr serial = WriteBio();
-  i2a_ASN1_INTEGER(serial.get(), X509_get0_serialNumber(certificate.get()));
-  facts.serial = TextOf(serial.get());
+  facts.serial = SerialOf(X509_get0_serialNumber(certificate.get()));
   unsigned char* der = nullptr;
   const int size = i2d_X509(certificate.get(), &der);
   if (size > 0) {
@@ -277,6 +282,20 @@ Result<std::string> MakeRevocationList(const KeyPair& authority,
   const BioPtr bio = WriteBio();
   PEM_write_bio_X509_CRL(bio.get(), list.get());
   return TextOf(bio.get());
+}
+
+Result<std::vector<std::string>> ReadRevocationList(const std::string& pem,
+                                                    const std::string& place) {
+  const BioPtr bio = ReadBio(pem);
+  const CrlPtr list(PEM_read_bio_X509_CRL(bio.get(), nullptr, nullptr, nullptr));
+  if (list == nullptr) return OpenSslError(place + " holds no revocation list");
+  std::vector<std::string> serials;
+  STACK_OF(X509_REVOKED)* revoked = X509_CRL_get_REVOKED(list.get());
+  for (int i = 0; i < sk_X509_REVOKED_num(revoked); ++i) {
+    serials.push_back(SerialOf(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(revoked, i))));
+  }
+  std::sort(serials.begin(), serials.end());
+  return serials;
 }
 
 }  // namespace exemplar::security

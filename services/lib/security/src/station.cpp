@@ -135,6 +135,35 @@ Result<AccessList> ReadAccess(const fs::path& folder) {
   return ReadAccessList(folder / "access.yaml");
 }
 
+/// The role that a member's folder was made for.
+Result<std::string> RoleOf(const fs::path& member) {
+  try {
+    return YAML::LoadFile((member / "member.yaml").string())["role"].as<std::string>();
+  } catch (const YAML::Exception& e) {
+    return InvalidArgument((member / "member.yaml").string() + ": " + e.msg);
+  }
+}
+
+/// The station's access file, and the copies of those that are called.
+Status WriteAccess(const fs::path& folder, const AccessList& access) {
+  if (Status written = WriteAccessList(folder / "access.yaml", access); !written) return written;
+  for (const fs::path& member : Folders(folder / "members")) {
+    const Result<std::string> name = RoleOf(member);
+    if (!name) return name.error();
+    const StationRole* role = FindStationRole(*name);
+    if (role == nullptr || !role->serves) continue;
+    if (Status written = WriteAccessList(member / "access.yaml", access); !written) return written;
+    // Whoever was given the folder goes on being able to read what is new in it.
+    struct stat owner {};
+    if (::stat(member.c_str(), &owner) == 0 && owner.st_uid != ::geteuid() &&
+        ::chown((member / "access.yaml").c_str(), owner.st_uid, owner.st_gid) != 0) {
+      return FailedPrecondition(
+          (member / "access.yaml").string() + " cannot be given to the folder's owner", "folder");
+    }
+  }
+  return {};
+}
+
 void Forget(std::vector<AccessEntry>& entries, const std::string& name) {
   std::erase_if(entries, [&](const AccessEntry& entry) { return entry.name == name; });
 }
@@ -262,7 +291,7 @@ Result<fs::path> IssueMember(const IssueRequest& request, Stamp now) {
                                   .sha256 = facts->sha256,
                                   .roles = request.calls.value_or(role->calls),
                                   .speaks_for_others = role->speaks_for_others});
-  if (Status written = WriteAccessList(request.folder / "access.yaml", *access); !written) {
+  if (Status written = WriteAccess(request.folder, *access); !written) {
     return written.error();
   }
   if (Status spread = SpreadRevocations(request.folder, *authority, now); !spread) {
@@ -286,9 +315,9 @@ Status RevokeMember(const fs::path& folder, const std::string& name, Stamp now) 
     return NotFound(
         "there is neither a member nor a token of \"" + name + "\" in " + folder.string(), "name");
   }
-  if (Status written = WriteAccessList(folder / "access.yaml", *access); !written) return written;
   std::error_code error;
   fs::remove_all(folder / "members" / name, error);
+  if (Status written = WriteAccess(folder, *access); !written) return written;
   return SpreadRevocations(folder, *authority, now);
 }
 
@@ -308,7 +337,7 @@ Result<std::string> AddToken(const fs::path& folder, const std::string& name, Ro
   AccessEntry entry{.name = name, .sha256 = Sha256Hex(token), .roles = roles};
   if (days > 0) entry.expires = FromNow(days, now).to;
   access->tokens.push_back(std::move(entry));
-  if (Status written = WriteAccessList(folder / "access.yaml", *access); !written) {
+  if (Status written = WriteAccess(folder, *access); !written) {
     return written.error();
   }
   return token;
@@ -324,13 +353,9 @@ Result<std::vector<MemberInfo>> ListMembers(const fs::path& folder) {
     if (!pem) return pem.error();
     const Result<CertificateFacts> facts = ReadCertificate(*pem, member.string());
     if (!facts) return facts.error();
-    std::string role;
-    try {
-      role = YAML::LoadFile((member / "member.yaml").string())["role"].as<std::string>();
-    } catch (const YAML::Exception& e) {
-      return InvalidArgument((member / "member.yaml").string() + ": " + e.msg);
-    }
-    members.push_back({member.filename().string(), role, facts->not_after, facts->serial});
+    const Result<std::string> role = RoleOf(member);
+    if (!role) return role.error();
+    members.push_back({member.filename().string(), *role, facts->not_after, facts->serial});
   }
   return members;
 }

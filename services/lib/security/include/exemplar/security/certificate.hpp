@@ -74,4 +74,9 @@ struct Revoked {
 Result<std::string> MakeRevocationList(const KeyPair& authority,
                                        const std::vector<Revoked>& revoked, Validity validity);
 
+/// The serial numbers on a revocation list, as CertificateFacts has them, sorted. `place` names the
+/// list in errors.
+Result<std::vector<std::string>> ReadRevocationList(const std::string& pem,
+                                                    const std::string& place);
+
 }  // namespace exemplar::security

@@ -7,7 +7,8 @@
 //   FOLDER/access.yaml                  who may call what over gRPC (access.hpp)
 //   FOLDER/revoked/SERIAL.pem           certificates that count no more
 //   FOLDER/members/NAME/                cert.pem, key.pem, ca.pem, crl.pem, governance.p7s,
-//                                       permissions.p7s, member.yaml
+//                                       permissions.p7s, member.yaml; of those that are called, a
+//                                       copy of access.yaml
 
 #include <filesystem>
 #include <optional>

@@ -20,6 +20,7 @@ struct StationRole {
   /// What its certificate may call over gRPC.
   RoleSet calls = {};
   bool speaks_for_others = false;  ///< hands on what people ask, in their name
+  bool serves = false;             ///< is called, and so needs the access file
 };
 
 std::span<const StationRole> StationRoles();
