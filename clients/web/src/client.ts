@@ -9,6 +9,8 @@ const textOf = (request: unknown): string => (typeof request === "string" ? requ
 export class Client {
   /** Who is logged in; empty where the gateway asks nobody. */
   who = "";
+  /** Called when the gateway no longer knows us. */
+  onLoggedOut: () => void = () => undefined;
   /** Whether there is a login at all. */
   secured = false;
   private csrf = "";
@@ -86,6 +88,7 @@ export class Client {
     const init: RequestInit = { method: "POST", headers: this.headers(), body };
     if (signal !== undefined) init.signal = signal;
     const answer = await this.reach(`/exemplar.v1.${method}`, init);
+    if (answer.status === 401) this.onLoggedOut();
     if (!answer.ok) throw errorOf(answer.status, await answer.text());
     return answer;
   }

@@ -39,6 +39,7 @@ class Page {
   async start(): Promise<void> {
     this.listen();
     this.setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
+    this.client.onLoggedOut = () => this.tellLoggedOut();
     this.live.onSample = (sample) => this.onSample(sample);
     this.live.onState = (problem) => this.tellView("live", this.gatewayAnswers ? problem : "");
     if (!(await this.enter())) return;
@@ -185,9 +186,7 @@ class Page {
   private async recover(): Promise<void> {
     try {
       if (!(await this.client.greet())) {
-        const link = make("a", "", "Log in again");
-        link.href = "/login";
-        byId("banner").replaceChildren("Your login has ended. ", link);
+        this.tellLoggedOut();
         return;
       }
     } catch (error) {
@@ -198,6 +197,14 @@ class Page {
     this.live.renew();
     if (!this.robotDrawn) await this.loadRobot();
     await this.skills.refresh();
+  }
+
+  private tellLoggedOut(): void {
+    const link = make("a", "", "Log in again");
+    link.href = "/login";
+    const banner = byId("banner");
+    banner.replaceChildren("Your login has ended. ", link);
+    banner.hidden = false;
   }
 
   private showServices(health: Health | undefined): void {

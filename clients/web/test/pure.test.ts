@@ -113,5 +113,10 @@ test("calls carry the page's token, streams end with their error, and a gateway 
   equal(messages.length, 1);
   equal((seen[1]?.headers as Record<string, string>)["X-CSRF-Token"], "abc");
   await rejects(client.call("SkillService/Learn"), { code: "permission_denied" });
+  let loggedOut = 0;
+  client.onLoggedOut = () => ++loggedOut;
+  answers.push(new Response('{"code":"unauthenticated","message":"not known"}', { status: 401 }));
+  await rejects(client.call("SkillService/List"), { code: "unauthenticated" });
+  equal(loggedOut, 1);
   await rejects(client.call("SkillService/List"), { code: "unavailable", unreachable: true });
 });
