@@ -35,6 +35,7 @@ class RawClient {
   RawClient& operator=(const RawClient&) = delete;
 
   bool connected() const { return connected_; }
+  int fd() const { return fd_; }
   bool Send(std::string_view bytes) {
     while (!bytes.empty()) {
       const ssize_t n = send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -143,5 +144,24 @@ class RawClient {
   bool ended_ = false;
   std::string read_;
 };
+
+struct Reply {
+  int status = 0;
+  std::string head;
+  std::string body;
+};
+
+/// One request on a connection of its own. `line` is method and target, `fields` are whole lines.
+inline Reply Ask(int port, const std::string& line, const std::string& fields = {},
+                 const std::string& body = {}) {
+  RawClient client(port);
+  client.Send(line + " HTTP/1.1\r\nHost: a\r\nConnection: close\r\n" + fields +
+              "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+  Reply reply;
+  reply.head = client.ReadTo("\r\n\r\n");
+  reply.body = client.ReadAll();
+  if (reply.head.size() > 12) reply.status = std::stoi(reply.head.substr(9, 3));
+  return reply;
+}
 
 }  // namespace exemplar::http::testing

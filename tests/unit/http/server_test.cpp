@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -402,7 +403,8 @@ class Echo final : public WebSocketSession {
 
 class WebSocketTest : public ServerTest {
  protected:
-  void MakeEcho(ServerOptions options = {}, WebSocketEndpoint endpoint = {}) {
+  void MakeEcho(ServerOptions options = {}, WebSocketEndpoint endpoint = {},
+                const std::function<void()>& more = {}) {
     Make(std::move(options));
     endpoint.open = [this](std::shared_ptr<WebSocket> socket) {
       const std::lock_guard lock(mutex_);
@@ -410,6 +412,7 @@ class WebSocketTest : public ServerTest {
       return std::make_unique<Echo>(std::move(socket), closed_);
     };
     ASSERT_TRUE(server_->RouteWebSocket("/ws", std::move(endpoint)).ok());
+    if (more) more();
     server_->Start();
   }
   std::shared_ptr<WebSocket> Socket(std::size_t i) {
@@ -447,6 +450,19 @@ TEST_F(WebSocketTest, CarriesTextAndBinaryMessages) {
   client.SendNoMore();
   EXPECT_TRUE(Eventually([&] { return closed_ == 1; }));
   EXPECT_FALSE(Socket(0)->SendText("late").open);
+}
+
+TEST_F(WebSocketTest, APathMayHaveAPageBesideItsEndpoint) {
+  MakeEcho({}, {.subprotocols = {"a.v1"}}, [this] {
+    const auto page = [](const Request&) { return Answer("page"); };
+    EXPECT_TRUE(server_->Route(Method::kGet, "/ws", page).ok());
+    EXPECT_FALSE(server_->Route(Method::kGet, "/ws", page).ok());
+  });
+  RawClient browser(port());
+  browser.Send("GET /ws HTTP/1.1\r\nHost: x\r\n\r\n");
+  EXPECT_TRUE(browser.ReadAnswer().ends_with("page"));
+  EXPECT_EQ(RawClient(port()).Upgrade("/ws", "Sec-WebSocket-Protocol: a.v1\r\n").substr(9, 3),
+            "101");
 }
 
 TEST_F(WebSocketTest, RefusesWhoOffersNoSubprotocolOrComesFromAnotherPage) {

@@ -61,7 +61,8 @@ class BeastServer final : public Server {
       : core_(std::move(options), log),
         tls_(std::move(tls)),
         acceptor_(core_.network),
-        pause_(core_.network) {}
+        pause_(core_.network),
+        refresh_(core_.network) {}
 
   ~BeastServer() override { Stop(); }
 
@@ -87,7 +88,10 @@ class BeastServer final : public Server {
 
   void Start() override {
     work_.emplace(core_.network.get_executor());
-    boost::asio::post(core_.network, [this] { Accept(); });
+    boost::asio::post(core_.network, [this] {
+      Accept();
+      RefreshTls();
+    });
     thread_ = std::thread([this] { core_.network.run(); });
   }
 
@@ -99,6 +103,7 @@ class BeastServer final : public Server {
       boost::system::error_code ignored;
       acceptor_.close(ignored);
       pause_.cancel();
+      refresh_.cancel();
       ForEach(&Connection::Finish);
     });
     AwaitEnd(core_.options.grace);
@@ -143,6 +148,22 @@ class BeastServer final : public Server {
       }
       Take(std::move(socket));
       Accept();
+    });
+  }
+
+  /// Files that are being replaced may not fit together for a moment.
+  void RefreshTls() {
+    if (!core_.options.tls || core_.options.tls->refresh <= Duration::zero()) return;
+    refresh_.expires_after(core_.options.tls->refresh);
+    refresh_.async_wait([this](boost::system::error_code stopped) {
+      if (stopped || core_.stopping) return;
+      const Status done = ReloadTls();
+      const std::string problem = done.ok() ? std::string() : done.error().message;
+      if (!problem.empty() && problem != tls_problem_) {
+        core_.log.Warning("TLS files not read again; the old ones stay", {{"why", problem}});
+      }
+      tls_problem_ = problem;
+      RefreshTls();
     });
   }
 
@@ -202,6 +223,8 @@ class BeastServer final : public Server {
   TlsContext tls_;
   tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_;
+  boost::asio::steady_timer refresh_;
+  std::string tls_problem_;  ///< of the last refresh; empty: none
   std::optional<boost::asio::executor_work_guard<boost::asio::io_context::executor_type>> work_;
   std::thread thread_;
   int port_ = 0;

@@ -25,6 +25,8 @@ struct TlsFiles {
   std::string key;              ///< of the certificate
   std::string client_ca = {};   ///< whose clients' certificates are taken; empty: none asked for
   bool require_client = false;  ///< refuse clients without a certificate
+  /// So often the files are read again, as by ReloadTls; 0: never by itself.
+  Duration refresh = std::chrono::seconds(30);
 };
 
 /// What a client can make the server hold or wait for.
@@ -46,7 +48,7 @@ struct Limits {
 /// Which web pages may use the server (browsers say where a page comes from; others do not).
 struct Origins {
   /// "https://app.foxglove.dev", "http://localhost:8080"; "*" is any. A page that this server
-  /// itself serves under an address or as localhost may always.
+  /// itself serves under an address, as localhost, or over TLS may always.
   std::vector<std::string> allowed;
 };
 
