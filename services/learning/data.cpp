@@ -1,6 +1,8 @@
 #include "learning/data.hpp"
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -19,12 +21,15 @@ api::ErasedPerson Mark(const std::vector<api::ErasedPerson>& there, const std::s
   return {.salt = salt, .hash = security::PersonHash(salt, person), .erased = now};
 }
 
-api::DataItem TrialItem(const api::TrialInfo& trial, std::uint64_t bytes, std::string action) {
+/// `bytes` of all trials: one that came meanwhile is not among them.
+api::DataItem DeletedTrial(const api::TrialInfo& trial,
+                           const std::map<std::string, std::uint64_t>& bytes) {
+  const auto size = bytes.find(trial.id);
   return {.kind = "trial",
           .name = trial.id,
-          .action = std::move(action),
+          .action = "deleted",
           .detail = "of skill " + trial.skill,
-          .bytes = bytes,
+          .bytes = size == bytes.end() ? 0 : size->second,
           .at = trial.submitted};
 }
 
@@ -93,7 +98,7 @@ Result<api::DataReport> Data::Foretell(const Scope& scope) {
   if (!bytes) return bytes.error();
   api::DataReport report;
   for (const api::TrialInfo& trial : scope.stored) {
-    report.items.push_back(TrialItem(trial, bytes->at(trial.id), "deleted"));
+    report.items.push_back(DeletedTrial(trial, *bytes));
   }
   for (const auto& [skill, versions] : scope.versions) {
     for (const StoredVersion& version : versions) {
@@ -131,7 +136,7 @@ Result<api::DataReport> Data::Carry(const Scope& scope, const std::string& perso
   if (const Status begun = NoteErased(person, scope.ids); !begun) return begun.error();
   api::DataReport report;
   for (const api::TrialInfo& trial : scope.stored) {
-    report.items.push_back(TrialItem(trial, bytes->at(trial.id), "deleted"));
+    report.items.push_back(DeletedTrial(trial, *bytes));
   }
   constexpr double kTrialsGone = 0.1;
   constexpr double kSkillsDone = 0.9;
@@ -173,8 +178,12 @@ Result<api::DataReport> Data::Erase(const api::EraseRequest& request,
   if (const Status valid = api::CheckPerson(request.person, "person"); !valid) {
     return valid.error();
   }
-  const Result<Work> work = Work::Begin(*this, "another erasure");
-  if (!work) return work.error();
+  std::optional<Work> work;
+  if (!request.dry_run) {
+    Result<Work> begun = Work::Begin(*this, "another erasure");
+    if (!begun) return begun.error();
+    work.emplace(*std::move(begun));
+  }
   const Result<Scope> scope = ScopeOf(request.person);
   if (!scope) return scope.error();
   if (request.dry_run) return Foretell(*scope);
@@ -210,8 +219,12 @@ void Data::Audit(const api::DataItem& item) {
 }
 
 Result<api::DataReport> Data::ApplyRetention(const api::RetentionRequest& request) {
-  const Result<Work> work = Work::Begin(*this, "the removal of what is too old");
-  if (!work) return work.error();
+  std::optional<Work> work;
+  if (!request.dry_run) {
+    Result<Work> begun = Work::Begin(*this, "the removal of what is too old");
+    if (!begun) return begun.error();
+    work.emplace(*std::move(begun));
+  }
   Retention retention = retention_;
   if (request.keep_days) retention.keep_trials_days = *request.keep_days;
   if (request.keep_versions_days) retention.keep_versions_days = *request.keep_versions_days;
@@ -252,9 +265,8 @@ Result<api::DataReport> Data::ApplyRetentionHeld(const Retention& retention, boo
       ++kept;
       continue;
     }
-    const auto size = bytes->find(trial.id);
     old_trials.push_back(trial.id);
-    report.items.push_back(TrialItem(trial, size == bytes->end() ? 0 : size->second, "deleted"));
+    report.items.push_back(DeletedTrial(trial, *bytes));
   }
   if (kept > 0) {
     report.notices.push_back(std::to_string(kept) +

@@ -199,10 +199,8 @@ Status Store::FinishErasure(const std::vector<std::string>& trials) {
     if (Status kept = transaction->Commit(); !kept) return kept;
   }
   if (Status rewritten = database_->Execute("VACUUM"); !rewritten) return rewritten;
-  if (Status marked = database_->Execute("UPDATE erased_persons SET finished = 1"); !marked) {
-    return marked;
-  }
-  return database_->EmptyWal();
+  if (Status emptied = database_->EmptyWal(); !emptied) return emptied;
+  return database_->Execute("UPDATE erased_persons SET finished = 1");
 }
 
 Result<bool> Store::HasUnfinishedErasure() {

@@ -20,7 +20,9 @@ void ProgramOptions::AddTo(program::Options& options) {
       .Add("--pre-buffer-mb", pre_buffer_mb_, "megabytes that they may take")
       .MinMax(0, 1e4)
       .Add("--expect", expected_, "ready once this topic has a writer; several times")
-      .Add("--schema-dir", schema_dir_, "IDL files, for topics whose writers bring no schema");
+      .Add("--schema-dir", schema_dir_, "IDL files, for topics whose writers bring no schema")
+      .Add("--keep-days", keep_days_, "recordings go so many days after their end; 0: never")
+      .MinMax(0, 1e5);
 }
 
 Status ProgramOptions::Apply(RecorderOptions& settings) const {

@@ -13,6 +13,7 @@ class ProgramOptions {
   void AddTo(program::Options& options);
   /// Fails when the schema folder cannot be read.
   Status Apply(RecorderOptions& settings) const;
+  double keep_days() const { return keep_days_; }
 
  private:
   bool all_topics_ = false;
@@ -23,6 +24,7 @@ class ProgramOptions {
   double pre_buffer_mb_ = 32;
   std::vector<std::string> expected_;
   std::string schema_dir_;
+  double keep_days_ = 0;
 };
 
 }  // namespace exemplar::recorder

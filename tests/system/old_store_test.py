@@ -64,6 +64,12 @@ class OldStoreTest(unittest.TestCase):
         self.assertGreater(self.schema(), 1)
         _, server = self.start()
         self.check_all_is_there(server)
+        # Whose trials they are nobody knew then; from now on it can be said.
+        trial = self.said["trials"][0]
+        self.assertEqual({t["person"] for t in exemplar("trial", "list", "--server", server)}, {""})
+        command = [processes.BINARIES / "exemplar", "trial", "set-person", trial, "user03", "--server", server]
+        self.assertEqual(subprocess.run([str(word) for word in command], check=False, timeout=60).returncode, 0)
+        self.assertEqual([t["id"] for t in exemplar("trial", "list", "--person", "user03", "--server", server)], [trial])
         # The next version goes on counting where the former program was.
         last = max(version["version"] for version in self.said["versions"])
         exemplar("skill", "learn", "press", "--option", "method=paper", "--server", server)
