@@ -28,6 +28,8 @@ std::string_view RemedyOf(const Error& error) {
     case ErrorCode::kPermissionDenied:
       return "whoever keeps the station's files makes a token that has the role:\n"
              "  exemplar security token FOLDER NAME --role ROLE";
+    case ErrorCode::kUnimplemented:
+      return "is it the address of another service? The gateway serves them all";
     case ErrorCode::kUnavailable:
       if (!error.message.starts_with("no answer from ")) return {};
       return "does it run there? --server HOST:PORT or EXEMPLAR_SERVER names another; what is "

@@ -40,6 +40,8 @@ class Source {
     Result<bus::ParticipantOptions> options = NetworkOf(words.network, "exemplar-watch");
     if (!options) return options.error();
     options->clock = &source->clock_;
+    source->place_ =
+        " in station \"" + options->station + "\" of domain " + std::to_string(options->domain);
     auto participant = bus::Participant::Create(*options);
     if (!participant) return participant.error();
     source->participant_ = std::move(*participant);
@@ -55,6 +57,8 @@ class Source {
   }
 
   api::TopicApi& topics() { return *topics_; }
+  /// " in station "lab" of domain 3", where it looks itself.
+  std::string place() const { return place_; }
   const Clock& clock() const { return clock_; }
 
  private:
@@ -64,7 +68,11 @@ class Source {
   std::unique_ptr<gateway::TopicHub> hub_;
   std::unique_ptr<gateway::TopicServer> server_;
   api::TopicApi* topics_ = nullptr;
+  std::string place_;
 };
+
+/// Where nobody is, others may be next door.
+constexpr const char* kWhereElse = ", nor anything else; `exemplar doctor` says who is where";
 
 constexpr Duration kAgain = std::chrono::milliseconds(100);
 
@@ -89,11 +97,13 @@ Status WaitForTopics(Source& source, const Words& words, const std::stop_token& 
       for (const api::TopicInfo& info : *known) names.push_back(info.topic);
       if (std::find(names.begin(), names.end(), topic) != names.end()) break;
       if (source.clock().Steady() >= end || !source.clock().SleepFor(kAgain, stop)) {
-        std::string what = "nobody writes \"" + topic + "\"";
+        std::string what = "nobody writes \"" + topic + "\"" + source.place();
         if (const auto nearest = NearestName(topic, names)) {
           what += "; did you mean \"" + *nearest + "\"?";
         } else if (!names.empty()) {
           what += "; there are " + Join(names, ", ");
+        } else {
+          what += kWhereElse;
         }
         return NotFound(what, "TOPIC");
       }
@@ -143,9 +153,14 @@ int WatchTable(Source& source, const Words& words, const std::stop_token& stop) 
     if (!source.clock().SleepFor(kAgain, stop)) return 0;
   }
   if (!source.clock().SleepFor(std::max(interval, kFirstRates), stop)) return 0;
+  bool warned = false;
   for (;;) {
     const auto topics = source.topics().List(words.topics);
     if (!topics) return stop.stop_requested() ? 0 : Fail(topics.error());
+    if (topics->empty() && !warned) {
+      Warn({"nobody writes any topic" + source.place() + "; `exemplar doctor` says who is where"});
+      warned = true;
+    }
     const std::string time = ToIso8601(source.clock().Now());
     if (words.format == "json") {
       for (const api::TopicInfo& info : *topics) PrintLine(ToJson(info, time));

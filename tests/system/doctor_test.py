@@ -131,6 +131,14 @@ class HealthyTest(Case):
         wrong = run("watch", "ircp/joint_stat", *HERE)
         self.assertEqual(wrong.returncode, 3)
         self.assertIn('did you mean "ircp/joint_state"?', wrong.stderr)
+        elsewhere = ["--domain", 61, "--station", "tset", "--wait", 0.5]
+        nobody = run("watch", "ircp/joint_state", *elsewhere)
+        self.assertEqual(nobody.returncode, 3)
+        self.assertIn('nobody writes "ircp/joint_state" in station "tset" of domain 61', nobody.stderr)
+        self.assertIn("exemplar doctor", nobody.stderr)
+        empty = run("watch", *elsewhere, "--count", 1)
+        self.assertEqual((empty.returncode, empty.stdout), (0, ""))
+        self.assertIn('nobody writes any topic in station "tset" of domain 61', empty.stderr)
 
         # Without an end it goes on until it is interrupted, which is no failure.
         endless = subprocess.Popen([str(word) for word in (BINARIES / "exemplar", "watch", "ircp/joint_state", *HERE)], stdout=subprocess.PIPE, text=True)

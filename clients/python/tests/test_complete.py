@@ -148,7 +148,7 @@ def filled(message: Any, place: str = "") -> set[str]:
     for field, value in message.ListFields():
         paths.add(place + field.name)
         if field.message_type is not None and not field.message_type.GetOptions().map_entry:
-            for each in value if field.label == field.LABEL_REPEATED else [value]:
+            for each in [value] if hasattr(value, "ListFields") else value:
                 paths |= filled(each, f"{place}{field.name}.")
     return paths
 

@@ -24,7 +24,7 @@ def test_a_token_has_its_roles_and_no_more(secured: SecuredStation, files: list[
     with exemplar.Client(secured.gateway, tls_ca=secured.ca, token=secured.token) as client:
         assert client.skills.list() == ()
         with pytest.raises(
-            exemplar.PermissionDeniedError, match="takes the role teach, and ben via gateway has"
+            exemplar.PermissionDeniedError, match="takes the role teach, and ben has observe"
         ) as refused:
             client.trials.submit("press", files[0])
         assert (refused.value.code, refused.value.field) == ("permission_denied", "role")

@@ -100,7 +100,7 @@ std::string MessageOf(const grpc::Status& status, const std::string& address) {
     case grpc::StatusCode::CANCELLED:
       return "the call to " + address + " was cancelled";
     case grpc::StatusCode::UNIMPLEMENTED:
-      return address + " does not serve this call: " + said;
+      return address + " does not serve this call" + (said.empty() ? "" : ": " + said);
     default:
       return address + ": " + said;
   }
