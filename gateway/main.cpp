@@ -15,6 +15,7 @@
 #include "gateway/ros2_side.hpp"
 #include "gateway/topic_hub.hpp"
 #include "gateway/topic_server.hpp"
+#include "gateway/web_side.hpp"
 
 int main(int argc, char** argv) {
   using namespace exemplar;
@@ -83,6 +84,9 @@ int main(int argc, char** argv) {
                                                clock, *log);
     if (!drawn) return program::Fail(kName, drawn.error());
     foxglove = std::move(*drawn);
+    if (const Status added = gateway::AddWebSide(words, http->server(), *log); !added) {
+      return program::Fail(kName, added.error());
+    }
     for (Metric& metric : http::MetricsOf(http->server())) figures.push_back(std::move(metric));
     for (Metric& metric : foxglove->metrics()) figures.push_back(std::move(metric));
     if (const Status started = http->Start(figures); !started) {
