@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -55,6 +56,9 @@ struct TopicHubOptions {
   std::vector<std::string> publish = {};
   /// Topics whose types are known though nobody may write them yet.
   std::vector<ircp::RawTopic> known = {};
+  /// Reads the programs' statuses, which announce how much each has sent; null: what is lost at a
+  /// writer's end is not counted.
+  std::function<Result<ircp::StatusSample>(std::span<const std::uint8_t>)> decode_status = {};
   std::string source = "gateway";  ///< of published samples that name none
   /// More are refused.
   std::size_t max_subscriptions = 256;

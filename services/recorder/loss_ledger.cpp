@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <tuple>
 
+#include "exemplar/ircp/clock_relation.hpp"
+
 namespace exemplar::recorder {
 namespace {
 
 constexpr Duration kRateWindow = std::chrono::seconds(1);
 /// Programs announce each second.
 constexpr Duration kSilence = std::chrono::seconds(2);
-
-/// The part of a writer's identity that all endpoints of one program share.
-std::string ParticipantOf(const std::string& writer) { return writer.substr(0, writer.find('|')); }
 
 std::uint64_t Since(std::uint64_t now, std::uint64_t before) {
   return now > before ? now - before : 0;  // a gap may have been filled in between
@@ -96,14 +95,15 @@ void LossLedger::AddDropped(const std::string& topic, const std::string& writer)
 
 void LossLedger::AddAnnounced(const std::string& status_writer, const ircp::TopicCount& count,
                               Duration steady_now) {
-  announced_[{count.topic, ParticipantOf(status_writer), count.source}] = {count.sent, steady_now};
+  announced_[{count.topic, ircp::ParticipantOf(status_writer), count.source}] = {count.sent,
+                                                                                 steady_now};
 }
 
 const LossLedger::Announcement* LossLedger::AnnouncedOf(const std::string& topic,
                                                         const std::string& writer,
                                                         const WriterEntry& entry) const {
   if (entry.source.empty()) return nullptr;
-  const auto found = announced_.find({topic, ParticipantOf(writer), entry.source});
+  const auto found = announced_.find({topic, ircp::ParticipantOf(writer), entry.source});
   return found == announced_.end() ? nullptr : &found->second;
 }
 

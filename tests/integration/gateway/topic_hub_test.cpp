@@ -167,6 +167,70 @@ TEST_F(TopicHubTest, CountsLossesByTheNumbersInTheSamples) {
   EXPECT_FALSE(hub_->Find("nothing"));
 }
 
+/// A hub whose programs announce what they sent.
+class AnnouncedTest : public TopicHubTest {
+ protected:
+  AnnouncedTest() {
+    Make({.decode_status = [this](std::span<const std::uint8_t>) -> Result<ircp::StatusSample> {
+      return status_;
+    }});
+    station_.Appear(ScaleTopic());
+    ircp::RawTopic status = ScaleTopic("ircp/scales/status");
+    status.type = "exemplar::ircp::v1::Status";
+    station_.Appear(status);
+  }
+  void Announce(std::uint64_t sent, const std::string& participant = "p") {
+    status_.sent = {{.topic = "scale", .source = "scale", .sent = sent}};
+    station_.Arrive("ircp/scales/status", ++statuses_, {}, participant + "|status");
+  }
+  std::uint64_t Lost() const { return hub_->Find("scale")->lost; }
+
+  ircp::StatusSample status_;
+  std::uint64_t statuses_ = 0;
+};
+
+TEST_F(AnnouncedTest, CountsWhatIsLostAtTheEndOnceItsTimeToComeIsOver) {
+  for (const std::uint64_t number : {5, 6, 9}) {
+    station_.Arrive("scale", 77, ScaleSample(number), "p|scale");
+  }
+  Announce(12);
+  EXPECT_EQ(Lost(), 2U);
+  clock_.Advance(milliseconds(999));
+  EXPECT_EQ(Lost(), 2U);
+  clock_.Advance(milliseconds(1));
+  EXPECT_EQ(Lost(), 5U);
+  station_.Arrive("scale", 78, ScaleSample(12), "p|scale");
+  EXPECT_EQ(Lost(), 4U);
+}
+
+TEST_F(AnnouncedTest, HearsProgramsThatAnnounceAllTheTime) {
+  station_.Arrive("scale", 1, ScaleSample(1), "p|scale");
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    Announce(10 + i);
+    clock_.Advance(milliseconds(20));
+  }
+  EXPECT_GE(Lost(), 9U);
+  clock_.Advance(milliseconds(1000));
+  EXPECT_EQ(Lost(), 108U);
+}
+
+TEST_F(AnnouncedTest, TakesAnAnnouncementForTheWriterOfItsProgramThatWasHeardLast) {
+  station_.Arrive("scale", 1, ScaleSample(3), "p|before");
+  clock_.Advance(milliseconds(10));
+  station_.Arrive("scale", 1, ScaleSample(1), "p|now");
+  station_.Arrive("scale", 1, ScaleSample(1), "other|scale");
+  Announce(4);
+  Announce(9, "stranger");
+  clock_.Advance(milliseconds(1500));
+  EXPECT_EQ(Lost(), 3U);
+}
+
+TEST_F(AnnouncedTest, MissesNothingOfAWriterThatItNeverHeard) {
+  Announce(40);
+  clock_.Advance(milliseconds(1500));
+  EXPECT_EQ(Lost(), 0U);
+}
+
 TEST_F(TopicHubTest, RefusesMoreSubscriptionsThanItsBound) {
   Make({.max_subscriptions = 2});
   auto first = hub_->Subscribe({});

@@ -21,7 +21,7 @@ struct TopicInfo {
   bool transient_local = false;
   int writers = 0;             ///< now
   std::uint64_t received = 0;  ///< by the gateway since it started, as all figures here
-  std::uint64_t lost = 0;      ///< by the numbers of those that came
+  std::uint64_t lost = 0;      ///< by the numbers of those that came or were announced
   double rate_hz = 0;          ///< over the last second
   double bytes_per_s = 0;
   int subscriptions = 0;  ///< of the gateway's clients, now
