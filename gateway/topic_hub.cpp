@@ -15,6 +15,7 @@ namespace {
 
 /// Of a transient local topic, the last sample is kept of at most this many writers.
 constexpr std::size_t kMostKept = 64;
+constexpr const char* kStatusType = "exemplar::ircp::v1::Status";
 
 /// `pattern` with * for any text. Goes back to the last star only: the time is bounded by the
 /// product of the lengths.
@@ -64,7 +65,8 @@ class Hub final : public TopicHub {
                            Discover(topic);
                            return true;
                          },
-                     .on_sample = [this](ircp::RawSample&& sample) { Add(std::move(sample)); }});
+                     .on_sample = [this](ircp::RawSample&& sample) { Add(std::move(sample)); },
+                     .observer = true});
     if (!tap) return tap.error();
     tap_ = std::move(*tap);
     return {};
@@ -205,11 +207,13 @@ class Hub final : public TopicHub {
     const Duration now = clock_.Steady();
     const auto sample = std::make_shared<const ircp::RawSample>(std::move(arrived));
     std::shared_ptr<const Queues> queues;
+    bool is_status = false;
     {
       const std::lock_guard lock(mutex_);
       const auto found = topics_.find(sample->topic);
       if (found == topics_.end()) return;
       TopicEntry& entry = found->second;
+      is_status = entry.topic.type == kStatusType;
       entry.tally.Add(*sample, now);
       if (!sample->valid) return;
       if (entry.topic.transient_local) {
@@ -221,8 +225,21 @@ class Hub final : public TopicHub {
       queues = entry.queues;
     }
     received_.fetch_add(1, std::memory_order_relaxed);
+    if (is_status) CountAnnounced(*sample, now);
     for (const QueuePtr& queue : *queues) {
       if (queue->Push(sample, now)) delivered_.fetch_add(1, std::memory_order_relaxed);
+    }
+  }
+
+  void CountAnnounced(const ircp::RawSample& sample, Duration now) {
+    if (!options_.decode_status) return;
+    const Result<ircp::StatusSample> status = options_.decode_status(sample.cdr);
+    if (!status) return;
+    const std::lock_guard lock(mutex_);
+    for (const ircp::TopicCount& count : status->sent) {
+      const auto found = topics_.find(count.topic);
+      if (found == topics_.end()) continue;
+      found->second.tally.AddAnnounced(sample.writer, count.source, count.sent, now);
     }
   }
 

@@ -147,6 +147,39 @@ TEST_F(BusTest, RawTapSeesSchemaAndBytesThatDecode) {
   EXPECT_EQ(decoded->positions, sent.positions);
 }
 
+TEST_F(BusTest, TapsThatLookOnAreNobodysReaders) {
+  const auto a = Join("lab");
+  const auto b = Join("lab");
+  const auto writer = WriterOf<ircp::SuitSample>(*a, "suit-1");
+  const auto raw_writer = a->MakeRawWriter({.topic = "lab/notes",
+                                            .type = "lab::Note",
+                                            .schema = "struct Note { long n; };",
+                                            .partition = {},
+                                            .reliable = true});
+  ASSERT_TRUE(raw_writer.ok());
+  std::atomic<int> tapped = 0;
+  ircp::RawTapOptions options;
+  options.on_sample = [&](ircp::RawSample&&) { ++tapped; };
+  options.observer = true;
+  const auto onlooker = b->MakeTap(options);
+  ASSERT_TRUE(onlooker.ok());
+  ASSERT_TRUE(Eventually([&] {
+    EXPECT_TRUE(writer->Write(Suit(0.5)).ok());
+    EXPECT_TRUE((*raw_writer)->Write(std::vector<std::uint8_t>{0, 1, 0, 0, 1, 0, 0, 0}, {}).ok());
+    return (*onlooker)->matched_writers("ircp/suit") == 1 &&
+           (*onlooker)->matched_writers("lab/notes") == 1 && tapped >= 2;
+  }));
+  EXPECT_EQ(writer->matched_readers(), 0);
+  EXPECT_EQ((*raw_writer)->matched_readers(), 0);
+
+  auto tap = b->MakeTap({});
+  ASSERT_TRUE(tap.ok());
+  EXPECT_TRUE(Eventually(
+      [&] { return writer->matched_readers() == 1 && (*raw_writer)->matched_readers() == 1; }));
+  tap = Error{};
+  EXPECT_TRUE(Eventually([&] { return writer->matched_readers() == 0; }));
+}
+
 TEST_F(BusTest, StationsNeverMix) {
   const auto a = Join("lab-a");
   const auto b = Join("lab-b");

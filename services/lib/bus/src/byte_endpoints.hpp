@@ -49,6 +49,7 @@ class ByteWriter {
   virtual Status Write(Bytes& bytes) = 0;
   virtual int matched_readers() const = 0;
   virtual bool WaitForAcknowledgments(Duration timeout) = 0;
+  virtual ircp::Guid guid() const = 0;
 };
 
 /// Thread-safe. After its destructor the callback is not called any more.

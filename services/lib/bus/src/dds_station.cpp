@@ -54,8 +54,14 @@ dds::DataWriterQos WriterQos(const TopicQos& row, std::string_view schema) {
 
 class DdsWriter final : public ByteWriter {
  public:
-  DdsWriter(dds::Publisher& publisher, dds::DataWriter& writer, std::string topic, bool reliable)
-      : publisher_(publisher), writer_(writer), topic_(std::move(topic)), reliable_(reliable) {}
+  /// `readers` is the listener of `writer`.
+  DdsWriter(dds::Publisher& publisher, dds::DataWriter& writer,
+            std::unique_ptr<ReaderCount> readers, std::string topic, bool reliable)
+      : publisher_(publisher),
+        readers_(std::move(readers)),
+        writer_(writer),
+        topic_(std::move(topic)),
+        reliable_(reliable) {}
 
   ~DdsWriter() override {
     if (reliable_) WaitForAcknowledgments(kLastWordsTimeout);
@@ -80,18 +86,17 @@ class DdsWriter final : public ByteWriter {
     return {};
   }
 
-  int matched_readers() const override {
-    dds::PublicationMatchedStatus status;
-    writer_.get_publication_matched_status(status);
-    return status.current_count;
-  }
+  int matched_readers() const override { return readers_->count(); }
 
   bool WaitForAcknowledgments(Duration timeout) override {
     return writer_.wait_for_acknowledgments(ToDds(timeout)) == ReturnCode_t::RETCODE_OK;
   }
 
+  ircp::Guid guid() const override { return ToGuid(writer_.guid()); }
+
  private:
   dds::Publisher& publisher_;
+  std::unique_ptr<ReaderCount> readers_;
   dds::DataWriter& writer_;
   std::string topic_;
   bool reliable_;
@@ -122,22 +127,26 @@ class DdsReader final : public ByteReader {
 
 class Station final : public DdsStation {
  public:
-  Station(ParticipantPtr participant, dds::Publisher& publisher, dds::Subscriber& subscriber,
-          const ParticipantOptions& options)
-      : participant_(std::move(participant)),
+  Station(std::unique_ptr<Onlookers> onlookers, ParticipantPtr participant,
+          dds::Publisher& publisher, dds::Subscriber& subscriber, const ParticipantOptions& options)
+      : onlookers_(std::move(onlookers)),
+        participant_(std::move(participant)),
         publisher_(publisher),
         subscriber_(subscriber),
         clock_(*options.clock),
         security_(options.security) {}
+  ~Station() override { participant_->set_listener(nullptr); }
 
   Result<std::unique_ptr<ByteWriter>> MakeWriter(const std::string& topic, const TypeInfo& type,
                                                  const TopicQos& qos) override {
     Result<dds::Topic*> made = FindOrMakeTopic(topic, type);
     if (!made.ok()) return made.error();
-    dds::DataWriter* writer = publisher_.create_datawriter(*made, WriterQos(qos, type.schema));
+    auto readers = std::make_unique<ReaderCount>(*onlookers_);
+    dds::DataWriter* writer = publisher_.create_datawriter(
+        *made, WriterQos(qos, type.schema), readers.get(), dds::StatusMask::publication_matched());
     if (writer == nullptr) return Refused(topic, "write");
     return std::unique_ptr<ByteWriter>(
-        std::make_unique<DdsWriter>(publisher_, *writer, topic, qos.reliable));
+        std::make_unique<DdsWriter>(publisher_, *writer, std::move(readers), topic, qos.reliable));
   }
 
   Result<std::unique_ptr<ByteReader>> MakeReader(const std::string& topic, const TypeInfo& type,
@@ -181,6 +190,7 @@ class Station final : public DdsStation {
     return known->second;
   }
 
+  const std::unique_ptr<Onlookers> onlookers_;  ///< the participant's listener
   ParticipantPtr participant_;
   dds::Publisher& publisher_;
   dds::Subscriber& subscriber_;
@@ -193,7 +203,9 @@ class Station final : public DdsStation {
 }  // namespace
 
 Result<std::unique_ptr<DdsStation>> DdsStation::Create(const ParticipantOptions& options) {
-  Result<ParticipantPtr> participant = MakeDdsParticipant(options, nullptr);
+  auto onlookers = std::make_unique<Onlookers>();
+  Result<ParticipantPtr> participant =
+      MakeDdsParticipant(options, Part::kTakesPart, onlookers.get());
   if (!participant.ok()) return participant.error();
   dds::PublisherQos publisher_qos;
   dds::SubscriberQos subscriber_qos;
@@ -206,8 +218,8 @@ Result<std::unique_ptr<DdsStation>> DdsStation::Create(const ParticipantOptions&
   if (publisher == nullptr || subscriber == nullptr) {
     return Internal("Fast DDS made no publisher or subscriber");
   }
-  return std::unique_ptr<DdsStation>(
-      std::make_unique<Station>(std::move(*participant), *publisher, *subscriber, options));
+  return std::unique_ptr<DdsStation>(std::make_unique<Station>(
+      std::move(onlookers), std::move(*participant), *publisher, *subscriber, options));
 }
 
 }  // namespace exemplar::bus

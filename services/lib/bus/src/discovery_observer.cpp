@@ -75,7 +75,7 @@ class Observer final : public DiscoveryObserver, private dds::DomainParticipantL
 
   /// Once, before anything else.
   Status Start(const ParticipantOptions& options) {
-    Result<ParticipantPtr> participant = MakeDdsParticipant(options, this);
+    Result<ParticipantPtr> participant = MakeDdsParticipant(options, Part::kReadsAll, this);
     if (!participant.ok()) return participant.error();
     participant_ = std::move(*participant);
     return {};

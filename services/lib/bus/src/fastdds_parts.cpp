@@ -14,6 +14,8 @@
 #include <algorithm>
 #include <cstring>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutErrConsumer.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
@@ -31,6 +33,8 @@ namespace {
 using eprosima::fastrtps::rtps::IPLocator;
 using rtps::Locator_t;
 
+/// The property of participants whose readers do not count.
+constexpr const char* kOnlooker = "exemplar.looks_on";
 constexpr int kMaxDomain = 232;
 constexpr std::size_t kMaxNameBytes = 200;
 constexpr std::uint32_t kTypicalSampleBytes = 1024;
@@ -254,7 +258,7 @@ void ParticipantDeleter::operator()(dds::DomainParticipant* participant) const {
   dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
 }
 
-Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
+Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options, Part part,
                                           dds::DomainParticipantListener* listener) {
   if (Status checked = CheckOptions(options); !checked.ok()) return checked.error();
   Result<std::vector<std::string>> interfaces = ResolveInterfaces(options.interfaces);
@@ -271,13 +275,18 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
     eprosima::fastrtps::LibrarySettingsAttributes settings;
     settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
     eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+    // Standard output belongs to a program's answers.
+    dds::Log::ClearConsumers();
+    dds::Log::RegisterConsumer(std::make_unique<dds::StdoutErrConsumer>());
   });
 
   dds::DomainParticipantQos qos;
   qos.name(options.name);
   if (Status secured = Secure(options, qos); !secured.ok()) return secured.error();
+  qos.user_data().setValue({options.user_data.begin(), options.user_data.end()});
   // Told to all who discover it, for `exemplar doctor`.
   qos.properties().properties().emplace_back("exemplar.version", EXEMPLAR_VERSION, true);
+  if (part == Part::kLooksOn) qos.properties().properties().emplace_back(kOnlooker, "true", true);
   rtps::DiscoverySettings& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = eprosima::fastrtps::Duration_t(kLeaseSeconds, 0);
   discovery.leaseDuration_announcementperiod =
@@ -285,8 +294,9 @@ Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
   if (servers->empty()) {
     qos.wire_protocol().builtin.initialPeersList = *peers;
   } else {
-    discovery.discoveryProtocol = listener == nullptr ? rtps::DiscoveryProtocol_t::CLIENT
-                                                      : rtps::DiscoveryProtocol_t::SUPER_CLIENT;
+    discovery.discoveryProtocol = part == Part::kTakesPart
+                                      ? rtps::DiscoveryProtocol_t::CLIENT
+                                      : rtps::DiscoveryProtocol_t::SUPER_CLIENT;
     discovery.m_DiscoveryServers = std::move(*servers);
   }
 
@@ -358,7 +368,55 @@ std::string ToText(const rtps::GUID_t& guid) {
   return text.str();
 }
 
+ircp::Guid ToGuid(const rtps::GUID_t& guid) {
+  ircp::Guid bytes{};
+  const auto entity =
+      std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value), bytes.begin());
+  std::copy(std::begin(guid.entityId.value), std::end(guid.entityId.value), entity);
+  return bytes;
+}
+
 Stamp ToStamp(const rtps::Time_t& time) { return Stamp::FromNanoseconds(time.to_ns()); }
+
+bool Onlookers::Has(const rtps::GuidPrefix_t& participant) const {
+  const std::lock_guard lock(mutex_);
+  return found_.count(participant) != 0;
+}
+
+void Onlookers::on_participant_discovery(dds::DomainParticipant*,
+                                         rtps::ParticipantDiscoveryInfo&& info) {
+  const bool gone = info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
+                    info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
+  bool looks_on = false;
+  for (const auto& property : info.info.m_properties) {
+    looks_on = looks_on || property.first() == kOnlooker;
+  }
+  const std::lock_guard lock(mutex_);
+  if (gone) {
+    found_.erase(info.info.m_guid.guidPrefix);
+  } else if (looks_on) {
+    found_.insert(info.info.m_guid.guidPrefix);
+  }
+}
+
+int ReaderCount::count() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<int>(
+      std::count_if(readers_.begin(), readers_.end(),
+                    [this](const auto& reader) { return !onlookers_.Has(reader.guidPrefix); }));
+}
+
+void ReaderCount::on_publication_matched(dds::DataWriter*,
+                                         const dds::PublicationMatchedStatus& status) {
+  rtps::GUID_t reader;
+  rtps::iHandle2GUID(reader, status.last_subscription_handle);
+  const std::lock_guard lock(mutex_);
+  if (status.current_count_change > 0) {
+    readers_.insert(reader);
+  } else {
+    readers_.erase(reader);
+  }
+}
 
 ArrivalGate::ArrivalGate(const Clock& clock, OnArrival on_arrival)
     : clock_(clock), on_arrival_(std::move(on_arrival)) {}

@@ -3,6 +3,7 @@
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
@@ -10,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "byte_endpoints.hpp"
@@ -41,9 +43,15 @@ struct ParticipantDeleter {
 };
 using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
 
-/// `listener` may be null; it outlives the participant. With one, the participant is told by a
-/// discovery server of all endpoints, not only of those that match its own.
-Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options,
+/// What a participant is there for.
+enum class Part {
+  kTakesPart,
+  kReadsAll,  ///< is told by a discovery server of all endpoints, not only of those that match its
+  kLooksOn,   ///< the same, and its readers do not count (ReaderCount)
+};
+
+/// `listener` may be null; it outlives the participant.
+Result<ParticipantPtr> MakeDdsParticipant(const ParticipantOptions& options, Part part,
                                           dds::DomainParticipantListener* listener);
 
 /// Registers BytesType under the type's name and creates the topic.
@@ -54,7 +62,35 @@ Result<dds::Topic*> MakeTopic(dds::DomainParticipant& participant, const std::st
 dds::DataReaderQos ReaderQos(bool reliable, bool transient_local, int max_samples);
 
 std::string ToText(const rtps::GUID_t& guid);
+ircp::Guid ToGuid(const rtps::GUID_t& guid);
 Stamp ToStamp(const rtps::Time_t& time);
+
+/// Notes which participants only look on. Thread-safe.
+class Onlookers final : public dds::DomainParticipantListener {
+ public:
+  bool Has(const rtps::GuidPrefix_t& participant) const;
+  void on_participant_discovery(dds::DomainParticipant* participant,
+                                rtps::ParticipantDiscoveryInfo&& info) override;
+
+ private:
+  mutable std::mutex mutex_;  ///< never held while Fast DDS is called
+  std::set<rtps::GuidPrefix_t> found_;
+};
+
+/// Counts a writer's readers, but those of onlookers. Thread-safe.
+class ReaderCount final : public dds::DataWriterListener {
+ public:
+  /// `onlookers` outlives it.
+  explicit ReaderCount(const Onlookers& onlookers) : onlookers_(onlookers) {}
+  int count() const;
+  void on_publication_matched(dds::DataWriter* writer,
+                              const dds::PublicationMatchedStatus& status) override;
+
+ private:
+  const Onlookers& onlookers_;
+  mutable std::mutex mutex_;  ///< never held while Fast DDS is called
+  std::set<rtps::GUID_t> readers_;
+};
 
 /// Takes samples and hands them on until closed. Fast DDS calls it on its receiving threads.
 class ArrivalGate final : public dds::DataReaderListener {

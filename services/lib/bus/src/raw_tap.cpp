@@ -60,7 +60,8 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
 
   /// Once, before anything else.
   Status Start(const ParticipantOptions& options) {
-    Result<ParticipantPtr> participant = MakeDdsParticipant(options, this);
+    Result<ParticipantPtr> participant =
+        MakeDdsParticipant(options, options_.observer ? Part::kLooksOn : Part::kReadsAll, this);
     if (!participant.ok()) return participant.error();
     for (const std::string& partition : {station_, std::string(kNoPartition)}) {
       dds::SubscriberQos qos;
@@ -89,16 +90,9 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
   }
 
   int matched_writers(const std::string& topic) const override {
-    std::vector<dds::DataReader*> readers;
-    {
-      const std::lock_guard lock(mutex_);
-      for (const auto& [key, entry] : readers_) {
-        if (key.topic == topic) readers.push_back(entry.reader);
-      }
-    }
     // A best-effort reader matches the writers of the others, too.
     int count = 0;
-    for (dds::DataReader* reader : readers) {
+    for (dds::DataReader* reader : ReadersOf(topic)) {
       dds::SubscriptionMatchedStatus status;
       reader->get_subscription_matched_status(status);
       count = std::max(count, status.current_count);
@@ -106,7 +100,22 @@ class Tap final : public RawTap, private dds::DomainParticipantListener {
     return count;
   }
 
+  std::vector<ircp::Guid> reader_guids(const std::string& topic) const override {
+    std::vector<ircp::Guid> guids;
+    for (dds::DataReader* reader : ReadersOf(topic)) guids.push_back(ToGuid(reader->guid()));
+    return guids;
+  }
+
  private:
+  std::vector<dds::DataReader*> ReadersOf(const std::string& topic) const {
+    std::vector<dds::DataReader*> readers;
+    const std::lock_guard lock(mutex_);
+    for (const auto& [key, entry] : readers_) {
+      if (key.topic == topic) readers.push_back(entry.reader);
+    }
+    return readers;
+  }
+
   struct TopicReader {
     std::unique_ptr<ArrivalGate> gate;
     dds::DataReader* reader = nullptr;

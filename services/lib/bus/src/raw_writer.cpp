@@ -72,6 +72,7 @@ class BytesWriter final : public ircp::RawWriter {
   bool WaitForAcknowledgments(Duration timeout) override {
     return writer_->WaitForAcknowledgments(timeout);
   }
+  ircp::Guid guid() const override { return writer_->guid(); }
 
  private:
   const std::unique_ptr<ByteWriter> writer_;

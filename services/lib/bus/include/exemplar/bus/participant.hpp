@@ -23,6 +23,7 @@ struct ParticipantOptions {
   /// Instead of a station: its topics lie in no partition, where other middlewares' do by default.
   bool without_station = false;
   std::string name = "exemplar";  ///< as discovery tools show it
+  std::string user_data = {};     ///< told to all who discover it
   /// Addresses or names ("127.0.0.1", "eth1") of the interfaces to use; empty: all.
   std::vector<std::string> interfaces = {};
   /// IPv4 addresses where other participants are sought beside multicast. The own machine is always
@@ -46,6 +47,8 @@ struct ParticipantOptions {
   std::string security = {};
   /// Stamps samples; null: the machine's. Outlives the participant.
   const Clock* clock = nullptr;
+  /// The network's own time stamps of samples come from that clock too, which is simulated.
+  bool stamps_all = false;
   /// Hears of malformed samples and incompatible writers; null: nobody. Outlives the participant.
   Log* log = nullptr;
 };

@@ -2,6 +2,8 @@
 // The network as the programs' behaviour sees it: ports only. bus/ implements them over Fast DDS,
 // MemoryBus within one process for tests.
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -27,6 +29,7 @@ class Writer {
   virtual ~Writer() = default;
   virtual Status Write(Sample sample) = 0;
   virtual std::uint64_t sent() const = 0;
+  /// Taps that only look on (RawTapOptions::observer) are none.
   virtual int matched_readers() const = 0;
   /// Waits until all matched reliable readers have acknowledged; false when `timeout` passed first.
   virtual bool WaitForAcknowledgments(Duration timeout) = 0;
@@ -102,6 +105,9 @@ class Bus : public TopicPort<SuitSample>,
 
 // ---- The raw side: any topic, its bytes untouched (the recorder, the gateway). ----
 
+/// An endpoint's identity on the network: its participant's in the first twelve bytes.
+using Guid = std::array<std::uint8_t, 16>;
+
 struct RawTopic {
   std::string topic;
   std::string type;    ///< the type's name on the network
@@ -133,12 +139,20 @@ class RawTap {
   virtual std::vector<RawTopic> topics() const = 0;
   /// Writers matched on `topic`.
   virtual int matched_writers(const std::string& topic) const = 0;
+  /// Of the tap's readers of `topic`; none where there is no network.
+  virtual std::vector<Guid> reader_guids(const std::string& topic) const {
+    (void)topic;
+    return {};
+  }
 };
 
 struct RawTapOptions {
   std::function<bool(const RawTopic&)> wanted = [](const RawTopic&) { return true; };
   std::function<void(const RawTopic&)> on_topic = [](const RawTopic&) {};
   std::function<void(RawSample&&)> on_sample = [](RawSample&&) {};  ///< on a network thread
+  /// Looks on: writers do not count it among their matched_readers, so that a program which waits
+  /// for its readers does not begin for it.
+  bool observer = false;
 };
 
 class RawBus {

@@ -19,6 +19,8 @@ class RawWriter {
   virtual int matched_readers() const = 0;
   /// Waits until all matched reliable readers have acknowledged; false when `timeout` passed first.
   virtual bool WaitForAcknowledgments(Duration timeout) = 0;
+  /// Zeros where there is no network.
+  virtual Guid guid() const { return {}; }
 };
 
 class RawOutlet {
