@@ -13,13 +13,16 @@
 
 #include "exemplar/ros2/frames.hpp"
 #include "exemplar/ros2/messages.hpp"
+#include "gateway/ros2_node.hpp"
 
 namespace exemplar::gateway {
 namespace {
 
+constexpr const char* kNodeName = "exemplar_gateway";
 // As rclcpp's default quality, and as tf2 has it.
 constexpr int kKeepLast = 10;
 constexpr int kKeepLastTransforms = 100;
+constexpr auto kTick = std::chrono::milliseconds(10);
 /// More than these waiting, and the oldest go.
 constexpr std::size_t kMaxWaiting = 64;
 /// Names of objects; more are not told on.
@@ -45,6 +48,7 @@ class Publisher {
   Status Publish(const Message& message, Stamp stamp) {
     return writer_->Write(ros2::Encode(message), stamp);
   }
+  ircp::Guid guid() const { return writer_->guid(); }
 
  private:
   explicit Publisher(std::unique_ptr<ircp::RawWriter> writer) : writer_(std::move(writer)) {}
@@ -65,19 +69,27 @@ class Bridge final : public Ros2Bridge {
       : robot_(robot), options_(std::move(options)), log_(log) {}
 
   ~Bridge() override {
+    ticker_ = {};
+    worker_ = {};
     readers_.clear();
     tap_.reset();
-    worker_ = {};
   }
 
   /// Once, before anything else.
   Status Start(ircp::Bus& station, ircp::RawOutlet& outlet, ircp::RawBus& taps) {
     outlet_ = &outlet;
+    node_.emplace(outlet, kNodeName);
     if (Status made = MakePublishers(outlet); !made.ok()) return made;
     if (Status told = TellOnce(); !told.ok()) return told;
     worker_ = std::jthread([this](const std::stop_token& stop) { Work(stop); });
+    if (clock_) ticker_ = std::jthread([this](const std::stop_token& stop) { Tick(stop); });
     if (Status read = Read(station); !read.ok()) return read;
-    return options_.robot_from.empty() ? Status() : TakeRobot(station, taps);
+    if (!options_.robot_from.empty()) {
+      auto writer = station.MakeWriter<ircp::JointStateSample>("ros2");
+      if (!writer.ok()) return writer.error();
+      robot_states_ = std::move(*writer);
+    }
+    return ReadGraph(taps);
   }
 
   void Flush() override {
@@ -96,19 +108,22 @@ class Bridge final : public Ros2Bridge {
     std::map<std::string, ircp::ObjectSample> objects;
     std::optional<ircp::PlanSample> plan;
     std::deque<std::vector<std::uint8_t>> robot_states;  ///< as ROS 2 sent them
+    std::deque<std::vector<std::uint8_t>> nodes;         ///< likewise, ros_discovery_info
 
     bool empty() const {
-      return !state && commands.empty() && objects.empty() && !plan && robot_states.empty();
+      return !state && commands.empty() && objects.empty() && !plan && robot_states.empty() &&
+             nodes.empty();
     }
   };
 
   Status MakePublishers(ircp::RawOutlet& outlet) {
-    const auto make = [&outlet](auto& publisher, const std::string& topic, bool latched,
-                                int keep_last) -> Status {
+    const auto make = [this, &outlet](auto& publisher, const std::string& topic, bool latched,
+                                      int keep_last) -> Status {
       auto made =
           std::remove_reference_t<decltype(*publisher)>::Create(outlet, topic, latched, keep_last);
       if (!made.ok()) return made.error();
       publisher = std::move(*made);
+      node_->AddWriter(publisher->guid());
       return {};
     };
     if (options_.robot_from.empty()) {
@@ -121,7 +136,16 @@ class Bridge final : public Ros2Bridge {
                                make(plan_, "/planned_trajectory", true, 1)}) {
       if (!made.ok()) return made;
     }
-    return {};
+    if (options_.clock == nullptr) return {};
+    return make(clock_, "/clock", false, 1);
+  }
+
+  /// The simulated time, which alone may end a sleep by it.
+  void Tick(const std::stop_token& stop) {
+    do {
+      const Stamp now = options_.clock->Now();
+      Count(clock_->Publish({now}, now));
+    } while (options_.clock->SleepFor(kTick, stop));
   }
 
   /// What does not change.
@@ -177,28 +201,33 @@ class Bridge final : public Ros2Bridge {
     return {};
   }
 
-  Status TakeRobot(ircp::Bus& station, ircp::RawBus& taps) {
-    auto writer = station.MakeWriter<ircp::JointStateSample>("ros2");
-    if (!writer.ok()) return writer.error();
-    robot_states_ = std::move(*writer);
-    auto tap = taps.MakeTap(
-        {.wanted =
-             [topic = ros2::DdsTopic(options_.robot_from)](const ircp::RawTopic& offered) {
-               return offered.topic == topic &&
-                      offered.type == ros2::TypeNameOf<ros2::JointState>();
-             },
-         .on_sample =
-             [this](ircp::RawSample&& sample) {
-               if (!sample.valid) return;
-               {
-                 const std::lock_guard lock(mutex_);
-                 auto& states = waiting_.robot_states;
-                 if (states.size() == kMaxWaiting) states.pop_front();
-                 states.push_back(std::move(sample.cdr));
-               }
-               wake_.notify_one();
-             }});
+  /// What other nodes say: of themselves, and the robot's joint states where one has them.
+  Status ReadGraph(ircp::RawBus& taps) {
+    const std::string robot =
+        options_.robot_from.empty() ? std::string() : ros2::DdsTopic(options_.robot_from);
+    auto tap = taps.MakeTap({.wanted =
+                                 [robot](const ircp::RawTopic& offered) {
+                                   if (offered.topic == ros2::kGraphTopic) {
+                                     return offered.type == ros2::kGraphType;
+                                   }
+                                   return offered.topic == robot &&
+                                          offered.type == ros2::TypeNameOf<ros2::JointState>();
+                                 },
+                             .on_sample =
+                                 [this](ircp::RawSample&& sample) {
+                                   if (!sample.valid) return;
+                                   {
+                                     const std::lock_guard lock(mutex_);
+                                     auto& queue = sample.topic == ros2::kGraphTopic
+                                                       ? waiting_.nodes
+                                                       : waiting_.robot_states;
+                                     if (queue.size() == kMaxWaiting) queue.pop_front();
+                                     queue.push_back(std::move(sample.cdr));
+                                   }
+                                   wake_.notify_one();
+                                 }});
     if (!tap.ok()) return tap.error();
+    const std::lock_guard lock(mutex_);
     tap_ = std::move(*tap);
     return {};
   }
@@ -217,6 +246,7 @@ class Bridge final : public Ros2Bridge {
   }
 
   void Do(const Waiting& work) {
+    for (const std::vector<std::uint8_t>& bytes : work.nodes) node_->Hear(bytes);
     for (const std::vector<std::uint8_t>& bytes : work.robot_states) TakeState(bytes);
     for (const ircp::JointCommandSample& command : work.commands) {
       Count(commands_->Publish(ros2::ToJointState(command), command.header.stamp));
@@ -227,6 +257,7 @@ class Bridge final : public Ros2Bridge {
       Count(plan_->Publish(ros2::ToJointTrajectory(*work.plan, base_frame()),
                            work.plan->header.stamp));
     }
+    if (const Status told = node_->Tell(); !told.ok()) Complain(told);
   }
 
   bool IsDue(Stamp stamp) {
@@ -254,6 +285,7 @@ class Bridge final : public Ros2Bridge {
                                                        false, kKeepLast);
       if (!made.ok()) return Count(made.error());
       known = poses_.emplace(token, std::move(*made)).first;
+      node_->AddWriter(known->second.guid());
     }
     const Stamp stamp = object.header.stamp;
     const ros2::Header header{.stamp = stamp, .frame_id = base_frame()};
@@ -270,19 +302,34 @@ class Bridge final : public Ros2Bridge {
     const Status written = sample.ok() ? robot_states_->Write(*sample) : Status(sample.error());
     if (written.ok()) {
       ++taken_;
+      AddReaders();
     } else if (refused_++ == 0) {
       log_.Warning("joint state of ROS 2 refused",
                    {{"topic", options_.robot_from}, {"reason", written.error().message}});
     }
   }
 
+  /// The tap has opened its reader by the first message.
+  void AddReaders() {
+    const std::lock_guard lock(mutex_);
+    if (tap_ == nullptr || readers_told_) return;
+    for (const ircp::Guid& reader : tap_->reader_guids(ros2::DdsTopic(options_.robot_from))) {
+      node_->AddReader(reader);
+    }
+    readers_told_ = true;
+  }
+
   void Count(const Status& published) {
     if (published.ok()) {
       ++published_;
-    } else if (!complained_) {
-      complained_ = true;
-      log_.Warning("not told to ROS 2", {{"reason", published.error().message}});
+    } else {
+      Complain(published);
     }
+  }
+
+  void Complain(const Status& failed) {
+    if (complained_.exchange(true)) return;
+    log_.Warning("not told to ROS 2", {{"reason", failed.error().message}});
   }
 
   std::string base_frame() const {
@@ -293,14 +340,17 @@ class Bridge final : public Ros2Bridge {
   const Ros2Options options_;
   Log& log_;
   ircp::RawOutlet* outlet_ = nullptr;
+  std::optional<Ros2Node> node_;  ///< of the worker alone, once it runs
+  bool readers_told_ = false;     ///< likewise
   std::optional<Publisher<ros2::JointState>> states_, commands_;
   std::optional<Publisher<ros2::TransformMessage>> transforms_, fixed_transforms_;
   std::optional<Publisher<ros2::String>> description_;
   std::optional<Publisher<ros2::JointTrajectory>> plan_;
+  std::optional<Publisher<ros2::Clock>> clock_;
   std::map<std::string, Publisher<ros2::PoseStamped>> poses_;
   std::unique_ptr<ircp::Writer<ircp::JointStateSample>> robot_states_;
   std::optional<Stamp> last_state_;
-  bool complained_ = false;
+  std::atomic<bool> complained_ = false;
   std::atomic<std::uint64_t> published_{0}, taken_{0}, refused_{0};
 
   std::mutex mutex_;
@@ -308,7 +358,8 @@ class Bridge final : public Ros2Bridge {
   Waiting waiting_;       ///< guarded by mutex_
   bool working_ = false;  ///< guarded by mutex_
   std::jthread worker_;
-  std::unique_ptr<ircp::RawTap> tap_;
+  std::jthread ticker_;
+  std::unique_ptr<ircp::RawTap> tap_;  ///< guarded by mutex_ while the worker runs
   std::vector<std::unique_ptr<ircp::Reader>> readers_;
 };
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "exemplar/base/clock.hpp"
 #include "exemplar/base/log.hpp"
 #include "exemplar/base/metric.hpp"
 #include "exemplar/base/result.hpp"
@@ -22,6 +23,8 @@ struct Ros2Options {
   /// ROS 2 topic of sensor_msgs/JointState that is the station's robot; empty: the robot speaks
   /// DDS itself. With one, /joint_states is left to ROS 2.
   std::string robot_from = {};
+  /// Told on /clock each 10 ms of its own, for nodes with use_sim_time; null: none.
+  const Clock* clock = nullptr;
 };
 
 /// Publishes, in the graph:

@@ -21,7 +21,7 @@ class MemoryStation final : public ircp::RawBus, public ircp::RawOutlet {
   }
   Result<std::unique_ptr<ircp::RawWriter>> MakeRawWriter(const ircp::RawTopic& topic) override {
     opened.push_back(topic);
-    return std::unique_ptr<ircp::RawWriter>(std::make_unique<Writer>(*this));
+    return std::unique_ptr<ircp::RawWriter>(std::make_unique<Writer>(*this, opened.size()));
   }
 
   /// A writer was found.
@@ -37,6 +37,11 @@ class MemoryStation final : public ircp::RawBus, public ircp::RawOutlet {
                         .source_stamp = Stamp::FromNanoseconds(static_cast<std::int64_t>(number)),
                         .received = Stamp::FromNanoseconds(1),
                         .cdr = std::move(cdr)});
+  }
+
+  /// Of the writer that was opened as number `writer`, from 1.
+  static ircp::Guid GuidOf(std::size_t writer) {
+    return {7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 0, 0, static_cast<std::uint8_t>(writer), 3};
   }
 
   std::vector<ircp::RawTopic> opened;
@@ -56,16 +61,18 @@ class MemoryStation final : public ircp::RawBus, public ircp::RawOutlet {
   };
   class Writer final : public ircp::RawWriter {
    public:
-    explicit Writer(MemoryStation& station) : station_(station) {}
+    Writer(MemoryStation& station, std::size_t number) : station_(station), number_(number) {}
     Status Write(std::span<const std::uint8_t> cdr, Stamp) override {
       station_.written.emplace_back(cdr.begin(), cdr.end());
       return {};
     }
     int matched_readers() const override { return 1; }
     bool WaitForAcknowledgments(Duration) override { return true; }
+    ircp::Guid guid() const override { return GuidOf(number_); }
 
    private:
     MemoryStation& station_;
+    const std::size_t number_;
   };
 
   ircp::RawTapOptions options_;

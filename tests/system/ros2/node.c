@@ -82,6 +82,12 @@ static void print_text(const char* topic, const void* message) {
   printf(", \"characters\": %zu, \"urdf\": %s", strlen(text->data_), strstr(text->data_, "<robot") != NULL ? "true" : "false");
 }
 
+static void print_clock(const char* topic, const void* message) {
+  const rosgraph_msgs_msg_dds__Clock_* now = message;
+  begin(topic, NULL);
+  printf(", \"sec\": %d, \"nanosec\": %u", now->clock_.sec_, now->clock_.nanosec_);
+}
+
 static void print_trajectory(const char* topic, const void* message) {
   const trajectory_msgs_msg_dds__JointTrajectory_* trajectory = message;
   begin(topic, &trajectory->header_);
@@ -92,6 +98,31 @@ static void print_trajectory(const char* topic, const void* message) {
     numbers("last", last->positions_._buffer, last->positions_._length);
     printf(", \"duration\": %.9f", last->time_from_start_.sec_ + 1e-9 * last->time_from_start_.nanosec_);
   }
+}
+
+static void gids(const char* name, const rmw_dds_common_msg_dds__Gid_* values, uint32_t count) {
+  printf(", \"%s\": [", name);
+  for (uint32_t i = 0; i < count; ++i) {
+    printf("%s\"", i ? ", " : "");
+    for (int k = 0; k < 16; ++k) printf("%02x", values[i].data_[k]);
+    printf("\"");
+  }
+  printf("]");
+}
+
+static void print_nodes(const char* topic, const void* message) {
+  const rmw_dds_common_msg_dds__ParticipantEntitiesInfo_* info = message;
+  begin(topic, NULL);
+  gids("participant", &info->gid_, 1);
+  printf(", \"nodes\": [");
+  for (uint32_t i = 0; i < info->node_entities_info_seq_._length; ++i) {
+    const rmw_dds_common_msg_dds__NodeEntitiesInfo_* node = &info->node_entities_info_seq_._buffer[i];
+    printf("%s{\"namespace\": \"%s\", \"name\": \"%s\"", i ? ", " : "", node->node_namespace_, node->node_name_);
+    gids("readers", node->reader_gid_seq_._buffer, node->reader_gid_seq_._length);
+    gids("writers", node->writer_gid_seq_._buffer, node->writer_gid_seq_._length);
+    printf("}");
+  }
+  printf("]");
 }
 
 typedef struct {
@@ -105,8 +136,10 @@ static const Subscription kTopics[] = {
     {"rt/robot_description", &std_msgs_msg_dds__String__desc, 1, print_text},
     {"rt/tf_static", &tf2_msgs_msg_dds__TFMessage__desc, 1, print_transforms},
     {"rt/planned_trajectory", &trajectory_msgs_msg_dds__JointTrajectory__desc, 1, print_trajectory},
+    {"ros_discovery_info", &rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc, 1, print_nodes},
     {"rt/joint_states", &sensor_msgs_msg_dds__JointState__desc, 0, print_state},
     {"rt/joint_command", &sensor_msgs_msg_dds__JointState__desc, 0, print_state},
+    {"rt/clock", &rosgraph_msgs_msg_dds__Clock__desc, 0, print_clock},
     {"rt/tf", &tf2_msgs_msg_dds__TFMessage__desc, 0, print_transforms},
     {"rt/objects/target/pose", &geometry_msgs_msg_dds__PoseStamped__desc, 0, print_pose},
 };
@@ -118,8 +151,65 @@ static dds_entity_t topic_of(dds_entity_t participant, const Subscription* subsc
   return topic;
 }
 
+/* As every ROS 2 process does, so that others know that they talk to ROS 2. Returns its writer. */
+static dds_entity_t announce(dds_entity_t participant) {
+  const Subscription nodes = {"ros_discovery_info", &rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc, 1, NULL};
+  dds_qos_t* qos = quality(1);
+  const dds_entity_t writer = dds_create_writer(participant, topic_of(participant, &nodes), qos, NULL);
+  check(writer, "writer");
+  dds_delete_qos(qos);
+  rmw_dds_common_msg_dds__NodeEntitiesInfo_ node;
+  memset(&node, 0, sizeof node);
+  strcpy(node.node_namespace_, "/");
+  strcpy(node.node_name_, "listener");
+  rmw_dds_common_msg_dds__ParticipantEntitiesInfo_ info;
+  memset(&info, 0, sizeof info);
+  dds_guid_t guid;
+  check(dds_get_guid(participant, &guid), "guid");
+  memcpy(info.gid_.data_, guid.v, sizeof info.gid_.data_);
+  info.node_entities_info_seq_._buffer = &node;
+  info.node_entities_info_seq_._length = 1;
+  check(dds_write(writer, &info), "write");
+  return writer;
+}
+
+/* What the middleware itself knows of the writers that are heard, and of their participants. */
+static void print_matched(const char* topic, dds_entity_t reader) {
+  dds_instance_handle_t handles[8];
+  const dds_return_t count = dds_get_matched_publications(reader, handles, 8);
+  for (dds_return_t i = 0; i < count && i < 8; ++i) {
+    dds_builtintopic_endpoint_t* writer = dds_get_matched_publication_data(reader, handles[i]);
+    if (writer == NULL) continue;
+    printf("{\"topic\": \"matched\", \"of\": \"%s\"", topic);
+    gids("writer", (const rmw_dds_common_msg_dds__Gid_*)writer->key.v, 1);
+    gids("participant", (const rmw_dds_common_msg_dds__Gid_*)writer->participant_key.v, 1);
+    printf("}\n");
+    dds_builtintopic_free_endpoint(writer);
+  }
+}
+
+static void print_participants(dds_entity_t participant) {
+  const dds_entity_t reader = dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, NULL, NULL);
+  check(reader, "participants");
+  void* found[1] = {NULL};
+  dds_sample_info_t info[1];
+  while (dds_take(reader, found, info, 1, 1) > 0) {
+    const dds_builtintopic_participant_t* one = found[0];
+    void* data = NULL;
+    size_t size = 0;
+    if (info[0].valid_data && dds_qget_userdata(one->qos, &data, &size) && size > 0) {
+      printf("{\"topic\": \"participant\", \"user_data\": \"%s\"", (const char*)data);
+      gids("gid", (const rmw_dds_common_msg_dds__Gid_*)one->key.v, 1);
+      printf("}\n");
+    }
+    dds_free(data);
+    check(dds_return_loan(reader, found, 1), "loan");
+  }
+}
+
 static void listen(dds_entity_t participant, double seconds) {
   dds_entity_t readers[kCount];
+  (void)announce(participant);
   const dds_entity_t waitset = dds_create_waitset(participant);
   for (int i = 0; i < kCount; ++i) {
     dds_qos_t* qos = quality(kTopics[i].latched);
@@ -145,6 +235,8 @@ static void listen(dds_entity_t participant, double seconds) {
     }
     fflush(stdout);
   }
+  for (int i = 0; i < kCount; ++i) print_matched(kTopics[i].topic, readers[i]);
+  print_participants(participant);
 }
 
 /* Four messages in a hundred are none that a robot can send: more names than positions. */

@@ -85,10 +85,19 @@ class CdrReader {
     std::uint32_t count = 0;
     Get(count);
     // An element takes at least four bytes, so that no count can make this allocate much.
-    if (status_.ok() && count > (bytes_.size() - at_) / 4) return Fail("counts more than it holds");
+    count = AtMost(count, 4);
     elements.reserve(count);
     for (std::uint32_t i = 0; i < count && status_.ok(); ++i) Get(elements.emplace_back());
   }
+  /// `count` of a sequence whose elements take at least `bytes` each; 0, and a fault, where so many
+  /// cannot be there.
+  std::uint32_t AtMost(std::uint32_t count, std::size_t bytes) {
+    if (!status_.ok()) return 0;
+    if (count <= left() / bytes) return count;
+    Fail("counts more than it holds");
+    return 0;
+  }
+  std::size_t left() const { return bytes_.size() - at_; }
   const Status& status() const { return status_; }
 
  private:

@@ -69,6 +69,8 @@ void Put(CdrWriter& cdr, const JointTrajectory& message) {
 
 void Put(CdrWriter& cdr, const String& message) { cdr.Put(message.data); }
 
+void Put(CdrWriter& cdr, const Clock& message) { PutTime(cdr, message.clock.nanoseconds()); }
+
 // ---------------------------------------------------------------- schemas
 
 /// `package`::msg::dds_::`body`, as rosidl's mapping onto DDS nests it.
@@ -166,6 +168,16 @@ struct Traits<String> {
   static std::string Schema() { return Module("std_msgs", "struct String_ { string data; };"); }
 };
 
+template <>
+struct Traits<Clock> {
+  static constexpr std::string_view kName = "rosgraph_msgs::msg::dds_::Clock_";
+  static std::string Schema() {
+    return Module("builtin_interfaces", "struct Time_ { long sec; unsigned long nanosec; };") +
+           Module("rosgraph_msgs",
+                  "struct Clock_ { builtin_interfaces::msg::dds_::Time_ clock; };");
+  }
+};
+
 }  // namespace
 
 template <class Message>
@@ -194,6 +206,7 @@ EXEMPLAR_ROS2_MESSAGE(TransformMessage)
 EXEMPLAR_ROS2_MESSAGE(PoseStamped)
 EXEMPLAR_ROS2_MESSAGE(JointTrajectory)
 EXEMPLAR_ROS2_MESSAGE(String)
+EXEMPLAR_ROS2_MESSAGE(Clock)
 #undef EXEMPLAR_ROS2_MESSAGE
 
 Result<JointState> DecodeJointState(std::span<const std::uint8_t> cdr_with_encapsulation) {

@@ -71,8 +71,13 @@ struct String {
   std::string data;
 };
 
-/// Little-endian CDR. Defined for JointState, TransformMessage, PoseStamped, JointTrajectory and
-/// String.
+/// rosgraph_msgs/msg/Clock
+struct Clock {
+  Stamp clock;
+};
+
+/// Little-endian CDR. Defined for JointState, TransformMessage, PoseStamped, JointTrajectory,
+/// String and Clock.
 template <class Message>
 std::vector<std::uint8_t> Encode(const Message& message);
 
