@@ -9,6 +9,7 @@ import pathlib
 import re
 import shutil
 import socket
+import ssl
 import subprocess
 import tempfile
 import threading
@@ -22,6 +23,7 @@ from processes import BINARIES, Programs, exemplar, wait_for
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ROBOT = ROOT / "deploy" / "models" / "arm7"
+PRESS = ROOT / "deploy" / "config" / "rail_press.yaml"
 SCENE = "obstacles: []\nbuttons:\n  - {name: target, position: [0.55, -0.15, 0.05], height: 0.02, radius: 0.02}\n"
 OBJECT = "target=0.55,-0.15,0.05,0,0,0,1"
 BUTTONS = [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06)]
@@ -221,9 +223,21 @@ class GatewayTest(unittest.TestCase):
             self.assertIn(b" 413 ", client.recv(100))
         self.assertEqual(self.retry("/exemplar.v1.SkillService/List")[0], 200)
         self.assertEqual(self.cli("skill", "show", "press")["skill"], "press")
-        after = self.metrics()
-        self.assertGreater(after["exemplar_http_connections_total"] + after["exemplar_http_refused_connections_total"],
-                           before["exemplar_http_connections_total"] + 100)
+        self.assertEqual(self.ask("/healthz", Origin="https://elsewhere.example")[0], 403)
+        for subprotocol in ("foxglove.websocket.v9", ""):
+            with socket.create_connection((host, int(port)), timeout=20) as client:
+                client.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                               b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: %s\r\n\r\n" % subprotocol.encode())  # fmt: skip
+                self.assertIn(b" 400 ", client.recv(100))
+
+        def grown(name, by):
+            return self.metrics()[f"exemplar_http_{name}_total"] >= before[f"exemplar_http_{name}_total"] + by
+
+        self.assertTrue(grown("bad_requests", 1))  # the huge one
+        self.assertTrue(grown("refused_origins", 1))
+        self.assertTrue(grown("refused_requests", 2))  # of another version
+        wait_for(lambda: grown("timeouts", 50), "the half-open requests to be cut", 30)
+
     def retry(self, path):
         """As ask, once the limit of connections a second allows it."""
         answers = []
@@ -249,6 +263,277 @@ class GatewayTest(unittest.TestCase):
             wait_for(lambda: self.metrics()["exemplar_gateway_missed_total"] > 0, "a sample to be missed", 60)
             self.assertIsNotNone(self.first_sample({"topics": ["ircp/joint_state"]}))
         wait_for(lambda: self.metrics()["exemplar_gateway_subscriptions"] <= others, "the stalled client to be given up", 60)
+
+
+class OnlookerTest(unittest.TestCase):
+    def test_a_capture_waits_for_its_readers_and_not_for_the_gateway(self):
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-gateway-"))
+        self.addCleanup(shutil.rmtree, folder)
+        programs = Programs(folder, "93")
+        self.addCleanup(programs.end)
+        port_file = folder / "http-port"
+        programs.start("exemplar-gateway", "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--http-port-file", port_file)
+        wait_for(lambda: port_file.exists() and port_file.read_text().strip(), "the gateway")
+        gateway = f"http://127.0.0.1:{port_file.read_text().strip()}/exemplar.v1.TopicService/List"
+
+        def sent():
+            """The topic as the gateway knows it, or nothing."""
+            with urllib.request.urlopen(gateway, timeout=5) as answer:
+                return {topic["topic"]: topic for topic in json.loads(answer.read())["topics"]}.get("ircp/end_effector")
+
+        capture = programs.start("exemplar-capture-suit", "--replay", trials.write_set(folder / "trials", BUTTONS[:1])[0])
+        wait_for(lambda: sent() and sent()["writers"], "the gateway to hear the capture")
+        _, recorder = programs.recorder()
+        self.assertEqual(capture.wait(60), 0, programs.logs())
+        recorded = {topic["topic"]: topic["received"] for topic in exemplar("--server", recorder, "record", "status")["topics"]}
+        self.assertGreater(recorded["ircp/end_effector"], 100)
+        self.assertEqual(str(recorded["ircp/end_effector"]), sent()["received"])
+
+
+class WebSocket:
+    """A client of Foxglove's protocol over TLS: whole, short frames only."""
+
+    def __init__(self, connection, path, origin=None):
+        self.connection, self.read = connection, b""
+        lines = [f"GET {path} HTTP/1.1", "Host: 127.0.0.1", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+                 "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol: foxglove.websocket.v1"]  # fmt: skip
+        connection.sendall("\r\n".join([*lines, *([f"Origin: {origin}"] if origin else []), "", ""]).encode())
+        while b"\r\n\r\n" not in self.read:
+            self.read += connection.recv(4096)
+        head, _, self.read = self.read.partition(b"\r\n\r\n")
+        self.status = int(head.split()[1])
+
+    def take(self, size):
+        while len(self.read) < size:
+            more = self.connection.recv(1 << 16)
+            if not more:
+                raise EOFError("the gateway closed the WebSocket")
+            self.read += more
+        taken, self.read = self.read[:size], self.read[size:]
+        return taken
+
+    def send(self, first, payload):
+        size = bytes([0x80 | len(payload)]) if len(payload) < 126 else bytes([0x80 | 126]) + len(payload).to_bytes(2, "big")
+        self.connection.sendall(bytes([first]) + size + bytes(4) + payload)
+
+    def say(self, **message):
+        self.send(0x81, json.dumps(message).encode())
+
+    def call(self, service, request):
+        """A service call's answer: its JSON, or the failure's text."""
+        self.send(0x82, bytes([2]) + service.to_bytes(4, "little") + bytes([1, 0, 0, 0, 4, 0, 0, 0]) + b"json" + json.dumps(request).encode())
+        while True:
+            answer = self.next()
+            if isinstance(answer, bytes) and answer[0] == 3:
+                return json.loads(answer[17:])
+            if isinstance(answer, dict) and answer["op"] == "serviceCallFailure":
+                return answer["message"]
+
+    def next(self):
+        """A text as JSON, anything else as bytes."""
+        first, size = self.take(2)
+        if size >= 126:
+            size = int.from_bytes(self.take(2 if size == 126 else 8), "big")
+        payload = self.take(size)
+        return json.loads(payload) if first == 0x81 else payload
+
+    def hear(self, op):
+        while True:
+            message = self.next()
+            if isinstance(message, dict) and message["op"] == op:
+                return message
+
+
+class AccessTest(unittest.TestCase):
+    """HTTPS, gRPC over TLS and WebSockets under one access file; the recorder behind judges the same people."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-gateway-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        cls.programs = Programs(cls.folder, "93")
+        cls.addClassCleanup(cls.programs.end)
+        station = cls.folder / "station"
+        cls.security("init", station, "--station", "test")
+        for member in ("gateway", "recorder"):
+            cls.security("issue", station, member, "--role", member, "--host", "127.0.0.1")
+        cls.tokens = {}
+        for role in ("observe", "record", "administer"):
+            said = cls.security("token", station, f"{role}r", "--role", role)
+            cls.tokens[role] = re.search(r"exm_\S+", said).group()
+        cls.authority = station / "members" / "gateway" / "ca.pem"
+
+        def identity(member):
+            folder = station / "members" / member
+            return "--tls-cert", folder / "cert.pem", "--tls-key", folder / "key.pem", "--access", station / "access.yaml"
+
+        _, recorder = cls.programs.recorder(*identity("recorder"), "--tls-client-ca", cls.authority)
+        port_file, http_file = cls.folder / "grpc-port", cls.folder / "http-port"
+        cls.programs.start(
+            "exemplar-gateway", *identity("gateway"), "--tls-ca", cls.authority, "--recorder", recorder, "--publish", "ircp/suit",
+            "--listen", "127.0.0.1:0", "--port-file", port_file, "--http", "127.0.0.1:0", "--http-port-file", http_file,
+        )  # fmt: skip
+        wait_for(lambda: http_file.exists() and http_file.read_text().strip(), "the gateway's ports")
+        cls.grpc = "127.0.0.1:" + port_file.read_text().strip().rsplit(":", 1)[-1]
+        cls.http_port = int(http_file.read_text())
+        cls.tls = ssl.create_default_context(cafile=cls.authority)
+
+    @staticmethod
+    def security(*words):
+        done = subprocess.run([str(word) for word in (BINARIES / "exemplar", "security", *words)], capture_output=True, text=True, timeout=20)
+        if done.returncode != 0:
+            raise AssertionError(f"{words}: {done.stderr}")
+        return done.stdout
+
+    def ask(self, path, body=None, **headers):
+        """Status, header fields and JSON of a call."""
+        url = f"https://127.0.0.1:{self.http_port}{path}"
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(url, data=data, headers={name.replace("_", "-"): value for name, value in headers.items()})
+        try:
+            with urllib.request.urlopen(request, timeout=20, context=self.tls) as answer:
+                return answer.status, answer.headers, answer.read().decode()
+        except urllib.error.HTTPError as error:
+            return error.code, error.headers, error.read().decode()
+
+    def as_role(self, role, path, body=None):
+        status, _, text = self.ask(path, body, Authorization=f"Bearer {self.tokens[role]}")
+        return status, json.loads(text)
+
+    def open(self, path, **options):
+        tcp = socket.create_connection(("127.0.0.1", self.http_port), timeout=20)
+        connection = self.tls.wrap_socket(tcp, server_hostname="127.0.0.1")
+        self.addCleanup(connection.close)
+        return WebSocket(connection, path, **options)
+
+    def test_http_calls_are_judged_by_role(self):
+        get, start, stop = (f"/exemplar.v1.RecorderService/{method}" for method in ("GetStatus", "Start", "Stop"))
+        for bearer in (None, "Bearer exm_wrong"):
+            status, headers, _ = self.ask(get, **({"Authorization": bearer} if bearer else {}))
+            self.assertEqual((status, headers["WWW-Authenticate"]), (401, 'Bearer realm="exemplar"'))
+        self.assertEqual(self.as_role("observe", get)[0], 200)
+        status, refusal = self.as_role("observe", start, {"name": "http"})
+        self.assertEqual((status, refusal["code"]), (403, "permission_denied"))
+        self.assertIn("observer", refusal["message"])
+        self.assertIn("record", refusal["message"])
+        status, answer = self.as_role("record", start, {"name": "http"})
+        self.assertEqual(status, 200, answer)
+        self.assertEqual(self.as_role("record", stop, {})[0], 200)
+
+    def test_topics_are_watched_by_observers_and_written_by_administrators(self):
+        service = "/exemplar.v1.TopicService/"
+        self.assertEqual(self.ask(service + "List")[0], 401)
+        self.assertEqual(self.ask(service + "Subscribe", {})[0], 401)
+        wait_for(lambda: "ircp/recorder/status" in str(self.as_role("observe", service + "List")), "the recorder's topic in the list")
+        sample = {"topic": "ircp/suit", "json": '{"names": ["elbow"], "positions": [0.5]}'}
+        for role, expected in (("observe", 403), ("record", 403), ("administer", 200)):
+            self.assertEqual(self.as_role(role, service + "Publish", sample)[0], expected, role)
+
+    def test_grpc_calls_are_judged_by_the_same_roles(self):
+        def run(role, *words):
+            command = [BINARIES / "exemplar", "--server", self.grpc, "--tls-ca", self.authority, *words]
+            token = ["--token", self.tokens[role]] if role else []
+            return subprocess.run([str(word) for word in [*command, *token]], capture_output=True, text=True, timeout=20)
+
+        self.assertNotEqual(run(None, "record", "status").returncode, 0)
+        self.assertEqual(run("observe", "record", "status").returncode, 0)
+        self.assertEqual(run("observe", "watch", "--count", "1", "ircp/recorder/status").returncode, 0)
+        refused = run("observe", "record", "start", "--name", "grpc")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("observer", refused.stderr)
+        self.assertEqual(run("record", "record", "start", "--name", "grpc").returncode, 0)
+        self.assertEqual(run("record", "record", "stop").returncode, 0)
+
+    def test_websockets_are_judged_call_by_call(self):
+        self.assertEqual(self.open("/").status, 401)
+        self.assertIn(self.open("/?token=exm_wrong").status, (401, 429))  # 429 soon after another wrong one
+        self.assertEqual(self.open(f"/?token={self.tokens['observe']}", origin="https://elsewhere.example").status, 403)
+        for role, may_record, may_publish in (("observe", False, False), ("record", True, False), ("administer", True, True)):
+            with self.subTest(role):
+                client = self.open(f"/?token={self.tokens[role]}")
+                self.assertEqual(client.status, 101)
+                self.assertEqual("clientPublish" in client.hear("serverInfo")["capabilities"], may_publish)
+                services = {service["name"]: service["id"] for service in client.hear("advertiseServices")["services"]}
+                self.assertIn('"state"', json.dumps(client.call(services["/recorder/status"], {})))
+                started = client.call(services["/recorder/start"], {"name": f"socket-{role}"})
+                self.assertEqual(isinstance(started, dict), may_record, started)
+                if may_record:
+                    self.assertIsInstance(client.call(services["/recorder/stop"], {}), dict)
+                else:
+                    self.assertIn("observer", started)
+                client.say(op="advertise", channels=[{"id": 1, "topic": "ircp/suit", "encoding": "json", "schemaName": "exemplar::ircp::v1::Suit"}])
+                if not may_publish:
+                    self.assertIn("publish", client.hear("status")["message"])
+
+    def test_a_browser_logs_in_with_a_cookie_and_proves_its_page(self):
+        status, headers, _ = self.ask("/exemplar.v1.RecorderService/GetStatus", Accept="text/html")
+        self.assertEqual(status, 200)  # urllib has followed to the page of the login
+        status, headers, text = self.ask("/login", {"token": self.tokens["record"]}, Content_Type="application/json")
+        self.assertEqual(status, 200, text)
+        cookie = headers["Set-Cookie"]
+        for part in ("Secure", "HttpOnly", "SameSite=Strict"):
+            self.assertIn(part, cookie)
+        session = {"Cookie": cookie.split(";")[0]}
+        self.assertEqual(self.ask("/exemplar.v1.RecorderService/GetStatus", **session)[0], 200)
+        start = "/exemplar.v1.RecorderService/Start"
+        self.assertEqual(self.ask(start, {"name": "forged"}, **session)[0], 403)
+        csrf = json.loads(self.ask("/session", **session)[2])["csrf"]
+        self.assertEqual(self.ask(start, {"name": "forged"}, X_CSRF_Token="guess", **session)[0], 403)
+        self.assertEqual(self.ask(start, {"name": "mine"}, X_CSRF_Token=csrf, **session)[0], 200)
+        self.assertEqual(self.ask("/exemplar.v1.RecorderService/Stop", {}, X_CSRF_Token=csrf, **session)[0], 200)
+        self.assertEqual(self.ask("/logout", {}, X_CSRF_Token=csrf, **session)[0], 200)
+        self.assertEqual(self.ask("/exemplar.v1.RecorderService/GetStatus", **session)[0], 401)
+
+    def test_refusals_are_counted(self):
+        with socket.create_connection(("127.0.0.1", self.http_port), timeout=20) as plain:
+            plain.sendall(b"GET / HTTP/1.1\r\n\r\n")
+            plain.shutdown(socket.SHUT_WR)
+        self.ask("/exemplar.v1.RecorderService/GetStatus")
+        self.ask("/healthz", Origin="https://elsewhere.example")
+        self.assertEqual(self.ask("/metrics")[0], 401)
+
+        def figures():
+            status, _, text = self.ask("/metrics", Authorization=f"Bearer {self.tokens['observe']}")
+            self.assertEqual(status, 200)
+            rows = (line.rpartition(" ") for line in text.splitlines() if not line.startswith("#"))
+            return {name: float(value) for name, _, value in rows}
+
+        for name in ("tls_failures", "refused_requests", "refused_origins"):
+            wait_for(lambda name=name: figures()[f"exemplar_http_{name}_total"] >= 1, name)
+
+
+class SimulatedTimeTest(unittest.TestCase):
+    def test_clients_are_told_the_simulated_time(self):
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-gateway-"))
+        self.addCleanup(shutil.rmtree, folder)
+        programs = Programs(folder, "93")
+        self.addCleanup(programs.end)
+        http_file = folder / "http-port"
+        programs.start(
+            "exemplar-gateway", "--clock", "network", "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--http-port-file", http_file
+        )
+        epoch_s = 1_000_000_000
+        programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", PRESS, "--cameras", "off", "--pace", "5", "--epoch-s", str(epoch_s))
+        wait_for(lambda: http_file.exists() and http_file.read_text().strip(), "the gateway's HTTP port", 40)
+        connection = socket.create_connection(("127.0.0.1", int(http_file.read_text())), timeout=20)
+        self.addCleanup(connection.close)
+        client = WebSocket(connection, "/")
+        self.assertIn("time", client.hear("serverInfo")["capabilities"])
+        channel = None
+        while channel is None:
+            channel = next((entry["id"] for entry in client.hear("advertise")["channels"] if entry["topic"] == "ircp/joint_state"), None)
+        client.say(op="subscribe", subscriptions=[{"id": 1, "channelId": channel}])
+        told = {1: [], 2: []}  # of messages, and of the time itself
+        while min(len(times) for times in told.values()) < 3:
+            message = client.next()
+            if isinstance(message, bytes) and message[0] in told:
+                at = 5 if message[0] == 1 else 1
+                told[message[0]].append(int.from_bytes(message[at : at + 8], "little") * 1e-9 - epoch_s)
+        for times in told.values():
+            self.assertEqual(times, sorted(times))
+            self.assertGreater(times[0], 0)
+            self.assertLess(times[-1], 3600)
+        self.assertGreater(told[2][-1], told[2][0])
 
 
 class LostBackendTest(unittest.TestCase):

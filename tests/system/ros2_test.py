@@ -17,6 +17,7 @@ from processes import Programs, exemplar, wait_for
 HERE = pathlib.Path(__file__).resolve().parent / "ros2"
 ROOT = HERE.parents[2]
 ROBOT = ROOT / "deploy" / "models" / "arm7"
+PRESS = ROOT / "deploy" / "config" / "rail_press.yaml"
 BUTTON = [0.55, -0.15, 0.05]
 SCENE = "obstacles: []\nbuttons:\n  - {name: target, position: [0.55, -0.15, 0.05], height: 0.02, radius: 0.02}\n"
 DOMAIN = "95"
@@ -28,7 +29,7 @@ class Ros2Test(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
         if not shutil.which("idlc") or not pathlib.Path("/usr/include/dds/dds.h").exists():
             self.skipTest("cyclonedds-dev and cyclonedds-tools are not installed")
-        subprocess.run(["idlc", "-l", "c", HERE / "ros2.idl"], cwd=self.folder, check=True, capture_output=True)
+        subprocess.run(["idlc", "-f", "case-sensitive", "-l", "c", HERE / "ros2.idl"], cwd=self.folder, check=True, capture_output=True)
         self.node = self.folder / "node"
         subprocess.run(["gcc", "-I", self.folder, HERE / "node.c", self.folder / "ros2.c", "-lddsc", "-o", self.node], check=True)
         self.programs = Programs(self.folder, DOMAIN)
@@ -83,6 +84,8 @@ class Ros2Test(unittest.TestCase):
         poses = heard["rt/objects/target/pose"]
         self.assertLess(math.dist(poses[-1]["pose"][:3], BUTTON), 0.03)
 
+        self.is_a_node_with(heard, {"rt/joint_states", "rt/joint_command", "rt/tf", "rt/tf_static", "rt/robot_description", "rt/planned_trajectory", "rt/objects/target/pose"})
+
         # Chained from the tool to the root, as tf2 does it.
         parents = {}
         for message in heard["rt/tf_static"] + heard["rt/tf"]:
@@ -96,11 +99,34 @@ class Ros2Test(unittest.TestCase):
         tool = status["tool"]
         self.assertLess(math.dist(position, tool["position"] if isinstance(tool, dict) else tool[:3]), 0.01)
 
+    def is_a_node_with(self, heard, topics):
+        """ros_discovery_info tells the participant and the writers that the middleware sees."""
+        told = [message for message in heard["ros_discovery_info"] if message["nodes"][0]["name"] == "exemplar_gateway"][-1]
+        self.assertEqual(told["nodes"][0]["namespace"], "/")
+        matched = [message for message in heard["matched"] if message["of"] in topics]
+        self.assertEqual({message["of"] for message in matched}, topics)
+        for message in matched:
+            self.assertEqual(message["participant"], told["participant"])
+            self.assertIn(message["writer"][0], told["nodes"][0]["writers"])
+        self.assertEqual(len(told["nodes"][0]["writers"]), len(topics))
+        self.assertIn(("enclave=/;", told["participant"]), [(seen["user_data"], seen["gid"]) for seen in heard["participant"]])
+
+    def test_nodes_get_the_simulated_time(self):
+        self.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", PRESS, "--cameras", "off", "--pace", "4", "--epoch-s", "1000000000")
+        self.server("exemplar-gateway", "--ros2", "--clock", "network")
+        times = [message["sec"] - 1_000_000_000 + 1e-9 * message["nanosec"] for message in self.heard(2)["rt/clock"]]
+        self.assertGreater(len(times), 50)
+        self.assertEqual(times, sorted(times))
+        self.assertGreater(times[0], 0)
+        self.assertLess(times[-1], 3600)
+
     def test_joint_states_of_ros_2_are_the_robots(self):
         self.server("exemplar-gateway", "--ros2", "--ros2-robot-from", "/robot/joint_states")
         recorder = self.server("exemplar-recorder", "--data-dir", self.folder / "data")
-        node = subprocess.Popen([self.node, DOMAIN, "robot", "4"])
+        node = subprocess.Popen([self.node, DOMAIN, "robot", "7"])
         exemplar("record", "start", "--name", "robot", "--topic", "ircp/joint_state", "--wait", "15", "--server", recorder)
+        nodes = [message["nodes"][0] for message in self.heard(2)["ros_discovery_info"]]
+        self.assertEqual([len(told["readers"]) for told in nodes if told["name"] == "exemplar_gateway"][-1], 1)  # of the robot's
         self.assertEqual(node.wait(30), 0)
         exemplar("record", "stop", "--server", recorder)
         info = exemplar("record", "info", self.folder / "data" / "robot.mcap")
