@@ -1,6 +1,6 @@
 """Every service as a stranger's client sees it: npm's gRPC, which learns the services from their reflection.
 
-Real programs with the reference driver as robot, in a network namespace of its own. Skipped without node and the packages
+Real programs with the simulator as robot, whose time waits for the executor, in a network namespace of its own. Skipped without node and the packages
 of tests/conformance/node (npm ci).
 """
 
@@ -22,7 +22,7 @@ from processes import BINARIES, ROOT, Programs, exemplar, wait_for  # noqa: E402
 
 NODE = HERE / "node"
 ROBOT = ROOT / "deploy" / "models" / "arm7"
-SCENE = "obstacles: []\nbuttons:\n  - {name: target, position: [0.55, -0.15, 0.05], height: 0.02, radius: 0.02}\n"
+SCENE = ROOT / "deploy" / "config" / "rail_press.yaml"
 PROTOS = sorted((ROOT / "proto" / "exemplar" / "v1").glob("*.proto"))
 SERVICES = {f"exemplar.v1.{name}" for proto in PROTOS for name in re.findall(r"(?m)^service (\w+)", proto.read_text(encoding="utf-8"))}
 BUTTONS = [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06), (0.66, -0.22, 0.06)]
@@ -37,13 +37,11 @@ class ServicesTest(unittest.TestCase):
         cls.programs = Programs(cls.folder, "96")
         cls.addClassCleanup(cls.programs.end)
         cls.files = trials.write_set(cls.folder / "trials", BUTTONS)
-        scene = cls.folder / "scene.yaml"
-        scene.write_text(SCENE, encoding="utf-8")
         cls.learning = cls.server("exemplar-learning", "--data-dir", cls.folder / "skills", "--robot", ROBOT, bus=False)
         cls.recorder = cls.server("exemplar-recorder", "--data-dir", cls.folder / "recordings")
-        cls.programs.start("exemplar-reference-driver", "--robot", ROBOT)
-        cls.executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", scene, "--learning", cls.learning, "--guard-touch-n", "0", "--state-patience-s", "5", "--command-patience-s", "5")
-        wait_for(lambda: exemplar("--server", cls.executor, "robot", "status").get("joint_names"), "the driver's joint state")
+        cls.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", SCENE, "--cameras", "off", "--in-step-with", "executor", "--pace", "3")
+        cls.executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", SCENE, "--learning", cls.learning, "--clock", "network", "--guard-touch-n", "0")
+        wait_for(lambda: exemplar("--server", cls.executor, "robot", "status").get("joint_names"), "the robot's joint state")
 
     @classmethod
     def server(cls, program, *words, bus=True):

@@ -190,7 +190,7 @@ def test_errors_name_code_and_field(client: exemplar.Client, press: exemplar.Ski
         client.skill("nothing").learn().result()
     with pytest.raises(FileNotFoundError):
         client.trials.submit("press", "absent.csv")
-    with pytest.raises(exemplar.FailedPreconditionError, match="does not serve"):
+    with pytest.raises(exemplar.UnimplementedError, match="does not serve"):
         client.robot.status()
 
 

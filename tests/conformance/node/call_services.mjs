@@ -94,6 +94,31 @@ const execution = { skill, objects, speed: 1 };
 let trial = "";
 let version = 0;
 
+/** What operators do with a service's data: its own backup is put back into it. */
+function data() {
+  let backup = [];
+  return {
+    ListPersons: { send: {}, check: ([answer]) => assert.ok(Array.isArray(answer.persons)) },
+    Backup: {
+      send: {},
+      check: (parts) => {
+        assert.ok(parts[0].plan.service);
+        backup = parts;
+      },
+    },
+    Restore: {
+      send: () => [
+        { header: { plan: backup[0].plan, mode: "MODE_MERGE" } },
+        ...backup.slice(1).map(({ begin, chunk }) => (begin ? { begin } : { chunk })),
+        { commit: true },
+      ],
+      check: ([answer]) => assert.ok(answer.report.items.every((item) => item.action)),
+    },
+    ApplyRetention: { send: { dry_run: true } },
+    ErasePerson: { send: { person: "nobody" }, check: (parts) => assert.ok(parts.at(-1).report) },
+  };
+}
+
 /** Service -> method -> what is sent, what may come. Each service's methods are called in this order. */
 const SCRIPT = {
   TrialService: {
@@ -106,6 +131,7 @@ const SCRIPT = {
     },
     List: { send: { skill: skill.name }, check: ([answer]) => assert.equal(answer.trials.length, files.length) },
     Get: { send: () => ({ id: trial }), check: ([answer]) => assert.equal(answer.trial.id, trial) },
+    SetPerson: { send: () => ({ id: trial, person: "user03" }) },
     Load: { send: () => ({ id: trial }), check: ([answer]) => assert.ok(answer.trial) },
     Segments: { send: () => [{ header: { id: trial } }] },
     Export: {
@@ -172,6 +198,8 @@ const SCRIPT = {
     Resume: { send: {} },
     Stop: { send: {}, check: ([answer]) => assert.match(answer.status.file, /reflected.*\.mcap$/) },
   },
+  LearningDataService: data(),
+  RecorderDataService: data(),
   TopicService: {
     List: { send: {}, check: ([answer]) => assert.ok(answer.topics.some((one) => one.topic === "ircp/joint_state")) },
     Subscribe: {
