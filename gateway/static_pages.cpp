@@ -146,13 +146,13 @@ http::Response AnswerStaticFile(const StaticFile& file, const http::Request& req
   return response;
 }
 
-Status AddPage(http::Server& server, StaticFiles files) {
+Status AddPage(http::Server& server, const StaticFiles& files) {
   if (!files.contains("index.html")) return InvalidArgument("there is no index.html");
-  for (auto& [path, file] : files) {
-    const auto answer = [shared = std::make_shared<const StaticFile>(std::move(file))](
-                            const http::Request& request) {
-      return AnswerPageFile(*shared, request);
-    };
+  for (const auto& [path, file] : files) {
+    const auto answer =
+        [shared = std::make_shared<const StaticFile>(file)](const http::Request& request) {
+          return AnswerPageFile(*shared, request);
+        };
     const std::string pattern = path == "index.html" ? "/" : "/" + path;
     if (Status added = server.Route(http::Method::kGet, pattern, answer, {.quick = true}); !added) {
       return added;

@@ -36,7 +36,7 @@ http::Response AnswerStaticFile(const StaticFile& file, const http::Request& req
 
 /// The page: index.html at "/", every file at "/NAME", with the headers that keep a page to itself.
 /// kInvalidArgument: there is no index.html.
-Status AddPage(http::Server& server, StaticFiles files);
+Status AddPage(http::Server& server, const StaticFiles& files);
 
 /// What stands at "/" where no page was built or found.
 Status AddPageMissing(http::Server& server, const std::string& looked_in);

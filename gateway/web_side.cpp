@@ -30,7 +30,7 @@ std::vector<fs::path> UsualFolders() {
 Status AddPageFrom(const fs::path& folder, http::Server& server) {
   Result<StaticFiles> files = ReadStaticFiles(folder);
   if (!files) return files.error();
-  if (Status added = AddPage(server, std::move(*files)); !added) {
+  if (Status added = AddPage(server, *files); !added) {
     return WithPlace(added.error(), folder.string());
   }
   return {};
@@ -38,7 +38,7 @@ Status AddPageFrom(const fs::path& folder, http::Server& server) {
 
 Status AddFoundPage(const ProgramOptions& words, http::Server& server, Log& log) {
   if (!words.web.empty()) {
-    const Status added = AddPageFrom(words.web, server);
+    Status added = AddPageFrom(words.web, server);
     if (!added) return WithPlace(added.error(), "--web");
     return added;
   }
@@ -52,7 +52,7 @@ Status AddFoundPage(const ProgramOptions& words, http::Server& server, Log& log)
   return AddPageMissing(server, looked_in);
 }
 
-Status AddDocument(http::Server& server, const char* path, std::string document) {
+Status AddDocument(http::Server& server, const char* path, const std::string& document) {
   return server.Route(http::Method::kGet, path,
                       [document](const http::Request&) { return http::Answer(document, kJson); });
 }
