@@ -1,21 +1,13 @@
 // Submits trials, learns a skill of them and asks it for a motion:
 //   learn_and_query HOST:PORT SKILL OBJECT X Y Z TRIAL.csv...
 
-#include <cstdlib>
-#include <exemplar/client.hpp>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <sstream>
 
-namespace {
+#include "common.hpp"
 
-int Fail(const exemplar::Error& error) {
-  std::cerr << exemplar::ToString(error.code) << ": " << error.message;
-  if (!error.field.empty()) std::cerr << " (" << error.field << ")";
-  std::cerr << '\n';
-  return 1;
-}
+namespace {
 
 std::string Bytes(const std::string& path) {
   std::ostringstream bytes;
@@ -32,12 +24,9 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string skill = argv[2];
-  geometry::NamedPose object{.name = argv[3], .has_orientation = false};
-  for (int i = 0; i < 3; ++i) {
-    object.base_T_object.translation[i] = std::strtod(argv[4 + i], nullptr);
-  }
+  const geometry::NamedPose object = ObjectOf(argv + 3);
 
-  const auto clients = rpc::Connect({.server = argv[1]});
+  const auto clients = rpc::Connect(OptionsFor(argv[1]));
   if (!clients) return Fail(clients.error());
   for (int i = 7; i < argc; ++i) {
     const std::string name = std::filesystem::path(argv[i]).filename().string();
@@ -51,7 +40,9 @@ int main(int argc, char** argv) {
   std::cout << "version " << report->version << " by " << report->method << " of "
             << report->trials.size() << " trials\n";
 
-  const auto motion = clients->skills->Query(skill, 0, {.objects = {object}});
+  demonstration::SkillQuery situation;
+  situation.objects = {object};
+  const auto motion = clients->skills->Query(skill, 0, situation);
   if (!motion) return Fail(motion.error());
   for (const std::string& warning : motion->warnings) std::cout << "warning: " << warning << '\n';
   std::cout << motion->frames() << " frames, " << motion->time_s.back() << " s";
