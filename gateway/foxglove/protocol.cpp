@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "exemplar/base/json_check.hpp"
+
 namespace exemplar::gateway::foxglove {
 namespace {
 
@@ -16,43 +18,6 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kMostEntries = 10'000;
 constexpr int kDeepest = 32;
-
-/// Follows a text's nesting and keeps nothing of it.
-class DepthCheck final : public nlohmann::json_sax<Json> {
- public:
-  bool null() override { return true; }
-  bool boolean(bool) override { return true; }
-  bool number_integer(number_integer_t) override { return true; }
-  bool number_unsigned(number_unsigned_t) override { return true; }
-  bool number_float(number_float_t, const string_t&) override { return true; }
-  bool string(string_t&) override { return true; }
-  bool binary(binary_t&) override { return true; }
-  bool start_object(std::size_t) override { return Enter(); }
-  bool key(string_t&) override { return true; }
-  bool end_object() override { return Leave(); }
-  bool start_array(std::size_t) override { return Enter(); }
-  bool end_array() override { return Leave(); }
-  bool parse_error(std::size_t position, const std::string&,
-                   const nlohmann::detail::exception&) override {
-    problem_ = "not JSON at byte " + std::to_string(position);
-    return false;
-  }
-  const std::string& problem() const { return problem_; }
-
- private:
-  bool Enter() {
-    if (++depth_ <= kDeepest) return true;
-    problem_ = "nested deeper than " + std::to_string(kDeepest);
-    return false;
-  }
-  bool Leave() {
-    --depth_;
-    return true;
-  }
-
-  int depth_ = 0;
-  std::string problem_;
-};
 
 /// The members of one JSON object; remembers the first that is not as it must be.
 class Members {
@@ -246,10 +211,10 @@ Result<ClientMessage> ReadPlaybackControl(ByteReader reader) {
 }  // namespace
 
 Status CheckJson(std::string_view text) {
-  DepthCheck check;
-  Json::sax_parse(text.begin(), text.end(), &check);
-  if (!check.problem().empty()) return InvalidArgument(check.problem());
-  return {};
+  const auto fault = FindJsonFault(text, kDeepest);
+  if (!fault) return {};
+  return InvalidArgument(fault->too_deep ? "nested deeper than " + std::to_string(kDeepest)
+                                         : "not JSON at byte " + std::to_string(fault->byte));
 }
 
 Result<ClientMessage> ParseText(std::string_view text) {

@@ -15,7 +15,7 @@
 namespace exemplar::gateway {
 namespace {
 
-using http::testing::RawClient;
+using http::testing::Reply;
 using security::Role;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -52,20 +52,9 @@ class DoorTest : public ::testing::Test {
     ASSERT_TRUE(written.ok()) << written.error().message;
   }
 
-  struct Reply {
-    int status = 0;
-    std::string head;
-    std::string body;
-  };
-  Reply Ask(const std::string& line, const std::string& fields = {}, const std::string& body = {}) {
-    RawClient client(server_->port());
-    client.Send(line + " HTTP/1.1\r\nHost: a\r\nConnection: close\r\n" + fields +
-                "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
-    Reply reply;
-    reply.head = client.ReadTo("\r\n\r\n");
-    reply.body = client.ReadTo("no such text");
-    if (reply.head.size() > 12) reply.status = std::stoi(reply.head.substr(9, 3));
-    return reply;
+  Reply Ask(const std::string& line, const std::string& fields = {},
+            const std::string& body = {}) const {
+    return http::testing::Ask(server_->port(), line, fields, body);
   }
 
   struct Login {
@@ -111,6 +100,8 @@ TEST_F(DoorTest, BrowsersAreLedToTheLogin) {
   EXPECT_EQ(page.status, 200);
   EXPECT_THAT(page.head, HasSubstr("Content-Security-Policy: default-src 'none'"));
   EXPECT_THAT(page.head, HasSubstr("frame-ancestors 'none'"));
+  EXPECT_THAT(page.head, Not(HasSubstr("unsafe-inline")));
+  EXPECT_THAT(Ask("GET /login.css").head, HasSubstr("Content-Type: text/css"));
 }
 
 TEST_F(DoorTest, ALoginIsACookieThatNoScriptReadsAndNoOtherSiteSends) {

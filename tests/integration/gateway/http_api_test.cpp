@@ -9,7 +9,7 @@
 namespace exemplar::gateway {
 namespace {
 
-using http::testing::RawClient;
+using http::testing::Reply;
 using Json = nlohmann::json;
 
 /// Answers as the test says, and keeps what it was asked.
@@ -51,20 +51,9 @@ class HttpApiTest : public testing::Test {
     server_->Start();
   }
 
-  struct Reply {
-    int status = 0;
-    std::string head;
-    std::string body;
-  };
-  Reply Ask(const std::string& line, const std::string& body = {}, const std::string& fields = {}) {
-    RawClient client(server_->port());
-    client.Send(line + " HTTP/1.1\r\nHost: a\r\nConnection: close\r\n" + fields +
-                "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
-    Reply reply;
-    reply.head = client.ReadTo("\r\n\r\n");
-    reply.body = client.ReadTo("no such text");
-    if (reply.head.size() > 12) reply.status = std::stoi(reply.head.substr(9, 3));
-    return reply;
+  Reply Ask(const std::string& line, const std::string& body = {},
+            const std::string& fields = {}) const {
+    return http::testing::Ask(server_->port(), line, fields, body);
   }
 
   NullLog log_;

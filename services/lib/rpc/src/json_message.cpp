@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "exemplar/base/json_check.hpp"
 #include "exemplar/base/text.hpp"
 
 namespace exemplar::rpc {
@@ -16,40 +17,7 @@ using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-/// Finds out whether a text is JSON, and where not; keeps nothing. Protobuf's own reader takes more
-/// than JSON, and does not say where it failed.
-class JsonChecker final : public nlohmann::json_sax<nlohmann::json> {
- public:
-  bool null() override { return true; }
-  bool boolean(bool) override { return true; }
-  bool number_integer(number_integer_t) override { return true; }
-  bool number_unsigned(number_unsigned_t) override { return true; }
-  bool number_float(number_float_t, const string_t&) override { return true; }
-  bool string(string_t&) override { return true; }
-  bool binary(binary_t&) override { return true; }
-  bool start_object(std::size_t) override { return Enter(); }
-  bool key(string_t&) override { return true; }
-  bool end_object() override { return Leave(); }
-  bool start_array(std::size_t) override { return Enter(); }
-  bool end_array() override { return Leave(); }
-  bool parse_error(std::size_t position, const std::string&,
-                   const nlohmann::detail::exception&) override {
-    at_ = position;
-    return false;
-  }
-  std::size_t at() const { return at_; }
-  bool too_deep() const { return depth_ > kDeepest; }
-
- private:
-  static constexpr int kDeepest = 64;
-  bool Enter() { return ++depth_ <= kDeepest; }
-  bool Leave() {
-    --depth_;
-    return true;
-  }
-  std::size_t at_ = 0;
-  int depth_ = 0;
-};
+constexpr int kDeepest = 64;
 
 /// "line 3, column 7" of the byte with that number, from 1.
 std::string PlaceOf(std::string_view text, std::size_t byte, int first_line) {
@@ -114,10 +82,10 @@ std::unique_ptr<Message> NewMessage(const Descriptor& type) {
 }
 
 Status ReadJson(std::string_view json, int first_line, Message& message) {
-  JsonChecker checker;
-  if (!nlohmann::json::sax_parse(json, &checker)) {
-    if (checker.too_deep()) return InvalidArgument("the JSON is nested too deep");
-    return InvalidArgument(PlaceOf(json, checker.at(), first_line) + ": this is not JSON");
+  // Protobuf's own reader takes more than JSON, and does not say where it failed.
+  if (const auto fault = FindJsonFault(json, kDeepest)) {
+    if (fault->too_deep) return InvalidArgument("the JSON is nested too deep");
+    return InvalidArgument(PlaceOf(json, fault->byte, first_line) + ": this is not JSON");
   }
   const std::size_t first = json.find_first_not_of(" \t\r\n");
   if (json[first] != '{') return InvalidArgument("the request must be a JSON object");
@@ -149,7 +117,7 @@ Status SetField(const std::string& path, const std::string& value, Message& mess
   const bool bare = field->cpp_type() != FieldDescriptor::CPPTYPE_STRING &&
                     field->cpp_type() != FieldDescriptor::CPPTYPE_ENUM;
   nlohmann::json text = value;
-  if (bare && nlohmann::json::accept(value)) text = nlohmann::json::parse(value);
+  if (bare && !FindJsonFault(value, kDeepest)) text = nlohmann::json::parse(value);
   nlohmann::json object;
   object[field->name()] = field->is_repeated() ? nlohmann::json::array({text}) : text;
   const std::unique_ptr<Message> read = NewMessage(*at->GetDescriptor());
