@@ -116,9 +116,9 @@ void AddClientOptions(CLI::App& app, security::ClientCredentials& client, bool o
 }  // namespace
 
 struct Options::Impl {
-  Impl(const std::string& name, std::string summary, const std::string& footer)
-      : program(name), app(std::move(summary), name) {
-    app.footer("Examples:\n" + footer +
+  Impl(std::string name, std::string summary, std::string footer)
+      : program(std::move(name)), app(std::move(summary), program) {
+    app.footer("Examples:\n" + std::move(footer) +
                "\n\nExit codes: 0 done, 2 usage, 3 not found, 4 refused, 5 unavailable, 1 anything "
                "else.");
     app.get_formatter()->column_width(34);
@@ -134,7 +134,7 @@ struct Options::Impl {
 };
 
 Options::Options(std::string program, std::string summary, std::string footer, Roles roles)
-    : impl_(std::make_unique<Impl>(program, std::move(summary), footer)) {
+    : impl_(std::make_unique<Impl>(std::move(program), std::move(summary), std::move(footer))) {
   CLI::App& app = impl_->app;
   CommonOptions& common = impl_->common;
   impl_->roles = roles;

@@ -291,7 +291,10 @@ Result<std::vector<std::string>> ReadRevocationList(const std::string& pem,
   if (list == nullptr) return OpenSslError(place + " holds no revocation list");
   std::vector<std::string> serials;
   STACK_OF(X509_REVOKED)* revoked = X509_CRL_get_REVOKED(list.get());
-  for (int i = 0; i < sk_X509_REVOKED_num(revoked); ++i) {
+  // -1 where the list is empty.
+  const int count = std::max(sk_X509_REVOKED_num(revoked), 0);
+  serials.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
     serials.push_back(SerialOf(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(revoked, i))));
   }
   std::sort(serials.begin(), serials.end());
