@@ -59,7 +59,7 @@ class ComposeTest(unittest.TestCase):
         cls.engine = stack.enter_context(Engine(CACHE, alone=True))
         cls.engine.inside("sh", "-c", f"mkdir -p {DISK} && mount -t tmpfs -o size={DISK_MB}m,uid=10001,gid=10001,mode=0750 none {DISK}")
         variables = {"EXEMPLAR_TEST_DISK": str(DISK), "EXEMPLAR_TEST_FAKETIME": str(cls.folder), "EXEMPLAR_STATION": "compose"}
-        cls.station = Station(cls.engine, OVERRIDE, variables)
+        cls.station = Station(cls.engine, [OVERRIDE], variables)
         try:
             cls.station.compose("down", "--volumes", "--timeout", "5")
             cls.teach()

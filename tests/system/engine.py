@@ -101,9 +101,9 @@ class Engine:
 class Station:
     """The containers of deploy/compose.yaml, under an engine."""
 
-    def __init__(self, engine, override, environment):
+    def __init__(self, engine, overrides, environment):
         self.engine = engine
-        self.files = ["-f", COMPOSE, "-f", override]
+        self.files = [word for file in (COMPOSE, *overrides) for word in ("-f", file)]
         self.environment = {**engine.environment, "COMPOSE_PROJECT_NAME": "exemplar", **environment}
 
     def compose(self, *words, timeout=180, **environment):
