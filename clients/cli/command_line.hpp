@@ -65,8 +65,8 @@ class Command {
   /// Where the value's type ("FILE", "DIR", "ID", "TOPIC") does not say it.
   Command& Completes(Names names);
 
-  /// What the command does: returns the exit code. Of a group, set behind its commands: what it does
-  /// where none of them is named.
+  /// What the command does: returns the exit code. Of a group, set behind its commands: what it
+  /// does where none of them is named.
   void Runs(std::function<int()> action);
 
  private:
