@@ -15,6 +15,7 @@
 #include "exemplar/security/access.hpp"
 #include "exemplar/security/certificate.hpp"
 #include "exemplar/security/digest.hpp"
+#include "exemplar/v1/data.pb.h"
 #include "exemplar/v1/executor.pb.h"
 #include "exemplar/v1/recorder.pb.h"
 #include "exemplar/v1/skill.pb.h"
@@ -160,7 +161,8 @@ std::set<std::string> AllMethods() {
   for (const google::protobuf::FileDescriptor* file :
        {v1::StopRobotRequest::descriptor()->file(), v1::StopRecordingRequest::descriptor()->file(),
         v1::ListSkillsRequest::descriptor()->file(), v1::ListTopicsRequest::descriptor()->file(),
-        v1::ListTrialsRequest::descriptor()->file()}) {
+        v1::ListTrialsRequest::descriptor()->file(),
+        v1::ListPersonsRequest::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
       for (int k = 0; k < file->service(i)->method_count(); ++k) {
         names.insert(file->service(i)->full_name() + "/" + file->service(i)->method(k)->name());
@@ -180,7 +182,9 @@ TEST(MethodRules, EveryMethodOfTheApiHasExactlyOneRule) {
 
 TEST(MethodRules, WhatMovesTheRobotOrDeletesIsAudited) {
   for (const MethodRule& rule : MethodRules()) {
-    const bool deletes = rule.method.ends_with("/Delete");
+    const bool deletes = rule.method.ends_with("/Delete") ||
+                         (rule.method.find("DataService/") != std::string_view::npos &&
+                          !rule.method.ends_with("/ListPersons"));
     const bool moves = rule.method.starts_with("exemplar.v1.ExecutorService/") &&
                        !rule.method.ends_with("/GetStatus") && !rule.method.ends_with("/Plan");
     if (deletes || moves) {
@@ -268,7 +272,8 @@ TEST_F(SecurityTest, CertificatesHaveTheRolesOfTheAccessFile) {
   EXPECT_TRUE(clients->recorder->GetStatus().ok());
   const auto refused = clients->recorder->Pause();
   ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_EQ(refused.error().code, ErrorCode::kPermissionDenied);
+  EXPECT_EQ(refused.error().field, "role");
   EXPECT_THAT(refused.error().message, HasSubstr("takes the role record"));
   EXPECT_EQ(calls_.back().outcome, "permission_denied");
 
@@ -285,13 +290,15 @@ TEST_F(SecurityTest, TokensHaveTheirRolesUntilTheyAreRevoked) {
   WriteAccess({.tokens = {ben}, .certificates = {}});
   Start({.credentials = {.access = Path("access.yaml")}});
   EXPECT_THAT(Ask({}).error().message, HasSubstr("--token"));
+  EXPECT_EQ(Ask({}).error().code, ErrorCode::kUnauthenticated);
+  EXPECT_EQ(Ask({}).error().field, "token");
   EXPECT_THAT(Ask({.token = "exm_guess"}).error().message, HasSubstr("not known"));
 
   WriteText("token", token + "\n");
   const auto clients = TryConnect({.token = "@" + Path("token")});
   EXPECT_TRUE(clients->recorder->Pause().ok());
   EXPECT_EQ(calls_.back().caller, "ben");
-  EXPECT_FALSE(clients->executor->Reset().ok());
+  EXPECT_EQ(clients->executor->Reset().error().code, ErrorCode::kPermissionDenied);
 
   WriteAccess({});
   const auto revoked = clients->recorder->Pause();

@@ -11,8 +11,9 @@ namespace exemplar::rpc {
 grpc::Status ToGrpc(const Status& status);
 /// What gRPC says of a connection that could not be made, in few words.
 std::string PlainReason(const std::string& said);
-/// The Error that the server had, or what the transport says. Where the server is of another version
-/// and its code has a name that is not known here, gRPC's code counts. Precondition: !status.ok().
+/// The Error that the server had, or what the transport says. Where the server is of another
+/// version and its code has a name that is not known here, gRPC's code counts. Precondition:
+/// !status.ok().
 Error FromGrpc(const grpc::Status& status, const std::string& address);
 
 }  // namespace exemplar::rpc
