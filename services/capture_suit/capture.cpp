@@ -43,12 +43,14 @@ Result<std::unique_ptr<Session>> MakeSession(ircp::Bus& bus, const Clock& clock,
       carrying.person.seed = static_cast<std::uint64_t>(options.seed);
       carrying.record = options.record;
       carrying.name = options.name;
+      carrying.demonstrator = options.demonstrator;
       return AsSession(CarrySession::Create(bus, clock, log, *robot, *scene, carrying));
     }
     PersonSessionOptions performing = options.performing;
     performing.record = options.record;
     performing.dead_man = options.dead_man;
     performing.name = options.name;
+    performing.demonstrator = options.demonstrator;
     performing.person.seed = static_cast<std::uint64_t>(options.seed);
     return AsSession(PersonSession::Create(bus, clock, log, *robot, *scene, performing));
   }
@@ -62,6 +64,7 @@ Result<std::unique_ptr<Session>> MakeSession(ircp::Bus& bus, const Clock& clock,
   replaying.record = options.record;
   replaying.dead_man = options.dead_man;
   replaying.name = options.name;
+  replaying.demonstrator = options.demonstrator;
   return AsSession(ReplaySession::Create(bus, clock, log, std::move(trials), replaying));
 }
 

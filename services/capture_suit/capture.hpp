@@ -21,11 +21,12 @@ struct CaptureOptions {
   std::string robot_folder;  ///< the person's body
   std::string scene_file;    ///< what stands around it
   PersonSessionOptions performing;
-  CarrySessionOptions carrying;  ///< of a person who carries, where `to` is named
-  std::string name = "trial";    ///< of the recordings
-  int seed = 1;                  ///< of the person's chance
-  bool dead_man = false;         ///< hold the dead-man on ircp/safety while a trial goes on
-  bool record = false;           ///< have the recorder record every trial
+  CarrySessionOptions carrying;   ///< of a person who carries, where `to` is named
+  std::string name = "trial";     ///< of the recordings
+  std::string demonstrator = {};  ///< whose demonstrations: a pseudonymous id for the recordings
+  int seed = 1;                   ///< of the person's chance
+  bool dead_man = false;          ///< hold the dead-man on ircp/safety while a trial goes on
+  bool record = false;            ///< have the recorder record every trial
 };
 
 /// Says what is missing or too much.

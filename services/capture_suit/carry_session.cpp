@@ -6,6 +6,7 @@
 
 #include "capture_suit/places.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::capture_suit {
 namespace {
@@ -120,7 +121,8 @@ Result<std::unique_ptr<CarrySession>> CarrySession::Create(
   if (!glove) return glove.error();
   session->glove_ = std::move(*glove);
   if (options.record) {
-    Result<RecorderRemote> recorder = RecorderRemote::Create(bus, clock, options.person.seed);
+    Result<RecorderRemote> recorder =
+        RecorderRemote::Create(bus, clock, options.person.seed, options.demonstrator);
     if (!recorder) return recorder.error();
     session->recorder_ = std::move(*recorder);
   }
@@ -138,11 +140,16 @@ Result<std::unique_ptr<CarrySession>> CarrySession::Create(
 Status CarrySession::Run(std::stop_token stop) {
   // The simulated robot, and the recorder where there is one.
   const int wanted = recorder_ ? 2 : 1;
-  const Duration deadline = clock_.Steady() + kReaderTimeout;
-  while ((suit_->matched_readers() < wanted || glove_->matched_readers() < wanted) &&
-         clock_.Steady() < deadline) {
-    if (!clock_.SleepFor(kPollInterval, stop)) return Cancelled();
+  {
+    const ircp::TimeHold hold(clock_);
+    const Clock& real = ircp::RealTimeOf(clock_);
+    const Duration deadline = real.Steady() + kReaderTimeout;
+    while ((suit_->matched_readers() < wanted || glove_->matched_readers() < wanted) &&
+           real.Steady() < deadline) {
+      if (!real.SleepFor(kPollInterval, stop)) return Cancelled();
+    }
   }
+  if (Status status = Send(posture_, 1); !status) return status;
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (stop.stop_requested()) return Cancelled();
     if (Status status = Perform(i, stop); !status) return status;
@@ -263,10 +270,11 @@ Status CarrySession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture, doub
 }
 
 bool CarrySession::WaitForAcknowledgments(const std::stop_token& stop) {
-  const Duration deadline = clock_.Steady() + kAcknowledgeTimeout;
+  const Clock& real = ircp::RealTimeOf(clock_);
+  const Duration deadline = real.Steady() + kAcknowledgeTimeout;
   while (!suit_->WaitForAcknowledgments(kAcknowledgeSlice) ||
          !glove_->WaitForAcknowledgments(kAcknowledgeSlice)) {
-    if (stop.stop_requested() || clock_.Steady() >= deadline) return false;
+    if (stop.stop_requested() || real.Steady() >= deadline) return false;
   }
   return true;
 }

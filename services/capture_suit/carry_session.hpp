@@ -21,13 +21,14 @@
 namespace exemplar::capture_suit {
 
 struct CarrySessionOptions {
-  std::string object = {};     ///< what is taken; a movable object of the scene
-  std::string to = {};         ///< upon what it is laid; an object of the scene
-  std::string places = {};     ///< of `object`, as ParsePlaces reads them; empty: where it is
-  std::string to_places = {};  ///< of `to`, as many; empty: where it is
-  std::string name = {};       ///< of the recordings
-  bool record = false;         ///< tell the recorder
-  double settle_s = 1.0;       ///< from placing the objects until the trial may start
+  std::string object = {};        ///< what is taken; a movable object of the scene
+  std::string to = {};            ///< upon what it is laid; an object of the scene
+  std::string places = {};        ///< of `object`, as ParsePlaces reads them; empty: where it is
+  std::string to_places = {};     ///< of `to`, as many; empty: where it is
+  std::string name = {};          ///< of the recordings
+  std::string demonstrator = {};  ///< whose demonstrations: a pseudonymous id for the recordings
+  bool record = false;            ///< tell the recorder
+  double settle_s = 1.0;          ///< from placing the objects until the trial may start
   reaching::PersonOptions person = {};
 };
 

@@ -26,7 +26,9 @@ Result<std::unique_ptr<DeadMan>> DeadMan::Create(ircp::Bus& bus, const Clock& cl
       ircp::StatusTopic("executor"),
       [dead_man](const ircp::StatusSample& status, const ircp::Reception&) {
         const bool on = status.state == "teleoperating";
-        dead_man->followed_.store(on && status.detail.starts_with("following"));
+        // One from before the press says nothing of it.
+        dead_man->followed_.store(dead_man->held_.load() && on &&
+                                  status.detail.starts_with("following"));
         if (on && !status.detail.starts_with("holding")) dead_man->answered_.store(true);
       });
   if (!reader.ok()) return reader.error();
@@ -44,6 +46,7 @@ DeadMan::~DeadMan() {
 void DeadMan::BeginToPress() {
   Set(false);
   answered_.store(false);
+  followed_.store(false);
   turn_at_ = clock_.Steady() + kReleasedFor;
 }
 

@@ -3,6 +3,7 @@
 
 #include "capture_suit/capture.hpp"
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/bus/station_clock.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 
@@ -18,7 +19,7 @@ int main(int argc, char** argv) {
       "exemplar-capture-suit --person --robot deploy/models/leonardo \\\n"
       "  --scene deploy/config/press_table.yaml --places '0.46,-0.12;0.4,-0.28' --record\n"
       "Ends by itself; 130 says that it was interrupted before its last trial.",
-      {.bus = true});
+      {.bus = true, .clock = true});
   options.Add("--replay", what.replay, "trial files (CSV) to play");
   options.Add("--rate", what.replaying.rate, "so many times faster than recorded")
       .MinMax(1e-3, 1e3);
@@ -46,6 +47,8 @@ int main(int argc, char** argv) {
               "teleoperated; a trial begins once the robot follows");
   options.Add("--record", what.record, "have the recorder record every trial");
   options.Add("--name", what.name, "of the recordings; several are numbered NAME-001");
+  options.Add("--demonstrator", what.demonstrator,
+              "whose demonstrations: a pseudonymous id, kept in the recordings");
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
   if (const Status usage = capture_suit::CheckUsage(what); !usage) {
     return options.Refuse(usage.error().message);
@@ -53,23 +56,27 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "capture-suit");
-  const SystemClock clock;
-  auto participant =
-      bus::Participant::Create({.domain = options.common().domain,
-                                .station = options.common().station,
-                                .name = kName,
-                                .interfaces = options.common().interfaces,
-                                .peers = options.common().peers,
-                                .discovery_servers = options.common().discovery_servers,
-                                .best_effort_topics = options.common().best_effort,
-                                .security = options.common().security,
-                                .clock = &clock,
-                                .log = log.get()});
+  bus::ParticipantOptions network{.domain = options.common().domain,
+                                  .station = options.common().station,
+                                  .name = kName,
+                                  .interfaces = options.common().interfaces,
+                                  .peers = options.common().peers,
+                                  .discovery_servers = options.common().discovery_servers,
+                                  .best_effort_topics = options.common().best_effort,
+                                  .security = options.common().security,
+                                  .log = log.get()};
+  auto station_clock =
+      bus::StationClock::Create(options.common().clock, network, "capture_suit", signals.token());
+  if (!station_clock) return program::Fail(kName, station_clock.error());
+  const Clock& clock = **station_clock;
+  auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
-  const auto session = capture_suit::MakeSession(**participant, clock, *log, what);
+  const auto session =
+      capture_suit::MakeSession(station_clock->bus(**participant), clock, *log, what);
   if (!session) return program::Fail(kName, session.error());
   const auto metrics = program::ServeMetrics(options.common(), capture_suit::MetricsOf(**session));
   if (!metrics) return program::Fail(kName, metrics.error());
+  station_clock->Begin(ircp::NetworkClock::Caller::kSleeps, *log, signals.token());
   const Status done = (*session)->Run(signals.token());
   if (done) return 0;
   const int code = program::Fail(kName, done.error());

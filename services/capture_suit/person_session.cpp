@@ -6,6 +6,7 @@
 
 #include "capture_suit/places.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::capture_suit {
 namespace {
@@ -81,7 +82,8 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
   if (!suit) return suit.error();
   session->suit_ = std::move(*suit);
   if (options.record) {
-    Result<RecorderRemote> recorder = RecorderRemote::Create(bus, clock, options.person.seed);
+    Result<RecorderRemote> recorder =
+        RecorderRemote::Create(bus, clock, options.person.seed, options.demonstrator);
     if (!recorder) return recorder.error();
     session->recorder_ = std::move(*recorder);
   }
@@ -102,7 +104,10 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
 }
 
 Status PersonSession::Run(std::stop_token stop) {
-  if (suit_) WaitForReaders(stop);
+  if (suit_) {
+    WaitForReaders(stop);
+    if (Status status = Send(posture_); !status) return status;
+  }
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (stop.stop_requested()) return Cancelled();
     if (Status status = PlaceButton(places_[i], stop); !status) return status;
@@ -177,13 +182,9 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
     }
   }
   if (dead_man_) {
-    const Status still = WhileStill(
-        [&]() -> Status {
-          clock_.SleepFor(kHeldAfter, stop);
-          dead_man_->Release();
-          return {};
-        },
-        stop);
+    const Duration held_until = clock_.Steady() + kHeldAfter;
+    const Status still = StandStill([&] { return clock_.Steady() < held_until; }, stop);
+    dead_man_->Release();
     if (sent) sent = still;
   }
   if (sent && !WaitForAcknowledgments(stop)) {
@@ -219,20 +220,27 @@ Status PersonSession::WhileStill(const std::function<Status()>& work, const std:
   return done ? sent : done;
 }
 
+Status PersonSession::StandStill(const std::function<bool()>& goes_on,
+                                 const std::stop_token& stop) {
+  while (goes_on()) {
+    if (Status sent = Send(posture_); !sent) return sent;
+    if (!clock_.SleepFor(FromSeconds(1 / options_.person.rate_hz), stop)) return Cancelled();
+  }
+  return {};
+}
+
 Status PersonSession::BeFollowed(const std::stop_token& stop) {
   if (!dead_man_) return {};
-  return WhileStill(
-      [&]() -> Status {
-        dead_man_->BeginToPress();
-        const Duration deadline = clock_.Steady() + kFollowTimeout;
-        while (!dead_man_->followed() && clock_.Steady() < deadline) {
-          dead_man_->GoOnPressing();
-          if (!clock_.SleepFor(kPollInterval, stop)) return Cancelled();
-        }
-        if (!dead_man_->followed()) log_.Warning("no robot follows the suit");
-        return {};
+  dead_man_->BeginToPress();
+  const Duration deadline = clock_.Steady() + kFollowTimeout;
+  const Status stood = StandStill(
+      [&] {
+        dead_man_->GoOnPressing();
+        return !dead_man_->followed() && clock_.Steady() < deadline;
       },
       stop);
+  if (stood && !dead_man_->followed()) log_.Warning("no robot follows the suit");
+  return stood;
 }
 
 Status PersonSession::MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop) {
@@ -261,9 +269,11 @@ Status PersonSession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture) {
 void PersonSession::WaitForReaders(std::stop_token stop) {
   // The simulated robot, and the recorder where there is one.
   const int wanted = recorder_ ? 2 : 1;
-  const Duration deadline = clock_.Steady() + kReaderTimeout;
-  while (suit_->matched_readers() < wanted && clock_.Steady() < deadline) {
-    if (!clock_.SleepFor(kPollInterval, stop)) return;
+  const ircp::TimeHold hold(clock_);
+  const Clock& real = ircp::RealTimeOf(clock_);
+  const Duration deadline = real.Steady() + kReaderTimeout;
+  while (suit_->matched_readers() < wanted && real.Steady() < deadline) {
+    if (!real.SleepFor(kPollInterval, stop)) return;
   }
   if (suit_->matched_readers() < wanted) {
     log_.Warning("fewer readers than expected", {{"topic", ircp::SuitSample::kTopic},
@@ -273,9 +283,10 @@ void PersonSession::WaitForReaders(std::stop_token stop) {
 }
 
 bool PersonSession::WaitForAcknowledgments(const std::stop_token& stop) {
-  const Duration deadline = clock_.Steady() + kAcknowledgeTimeout;
+  const Clock& real = ircp::RealTimeOf(clock_);
+  const Duration deadline = real.Steady() + kAcknowledgeTimeout;
   while (!suit_->WaitForAcknowledgments(kAcknowledgeSlice)) {
-    if (stop.stop_requested() || clock_.Steady() >= deadline) return false;
+    if (stop.stop_requested() || real.Steady() >= deadline) return false;
   }
   return true;
 }

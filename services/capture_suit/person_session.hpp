@@ -23,14 +23,15 @@
 namespace exemplar::capture_suit {
 
 struct PersonSessionOptions {
-  std::string object = {};              ///< the button to press; empty: the scene's first
-  std::string places = {};              ///< as ParsePlaces reads them; empty: where the button is
-  std::string name = {};                ///< of the recordings
-  bool dead_man = false;                ///< hold it, and begin when the robot follows
-  bool record = false;                  ///< tell the recorder
-  bool place_only = false;              ///< put the button at each place and press nothing
-  double press_depth_m = 0;             ///< 0: the button's travel and a little more
-  double settle_s = 1.0;                ///< from placing the button until the trial may start
+  std::string object = {};        ///< the button to press; empty: the scene's first
+  std::string places = {};        ///< as ParsePlaces reads them; empty: where the button is
+  std::string name = {};          ///< of the recordings
+  std::string demonstrator = {};  ///< whose demonstrations: a pseudonymous id for the recordings
+  bool dead_man = false;          ///< hold it, and begin when the robot follows
+  bool record = false;            ///< tell the recorder
+  bool place_only = false;        ///< put the button at each place and press nothing
+  double press_depth_m = 0;       ///< 0: the button's travel and a little more
+  double settle_s = 1.0;          ///< from placing the button until the trial may start
   reaching::PersonOptions person = {};  ///< its press_depth_m is set from the above
 };
 
@@ -58,6 +59,8 @@ class PersonSession final : public Session {
   Status MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop);
   /// Sends the last posture again and again meanwhile, as a suit does whose wearer stands still.
   Status WhileStill(const std::function<Status()>& work, const std::stop_token& stop);
+  /// The same as long as `goes_on`, which is asked before each sample.
+  Status StandStill(const std::function<bool()>& goes_on, const std::stop_token& stop);
   /// Presses the dead-man and waits for the robot, where there is one to wait for.
   Status BeFollowed(const std::stop_token& stop);
   Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture);

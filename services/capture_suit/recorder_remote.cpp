@@ -9,19 +9,22 @@ constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
 
 }  // namespace
 
-RecorderRemote::RecorderRemote(std::unique_ptr<ircp::ControlClient> client)
-    : client_(std::move(client)) {}
+RecorderRemote::RecorderRemote(std::unique_ptr<ircp::ControlClient> client,
+                               std::string demonstrator)
+    : client_(std::move(client)), demonstrator_(std::move(demonstrator)) {}
 
 Result<RecorderRemote> RecorderRemote::Create(ircp::Bus& bus, const Clock& clock,
-                                              std::uint64_t seed) {
+                                              std::uint64_t seed, const std::string& demonstrator) {
   auto client = ircp::ControlClient::Create(bus, clock, "recorder", "suit", seed);
   if (!client) return client.error();
-  return RecorderRemote(std::move(*client));
+  return RecorderRemote(std::move(*client), demonstrator);
 }
 
 Status RecorderRemote::Start(const std::string& name, const std::string& source,
                              std::stop_token stop) {
-  return Call("start", {{"name", name}, {"source", source}}, std::move(stop));
+  std::map<std::string, std::string> arguments = {{"name", name}, {"source", source}};
+  if (!demonstrator_.empty()) arguments["person"] = demonstrator_;
+  return Call("start", std::move(arguments), std::move(stop));
 }
 
 Status RecorderRemote::Stop(std::stop_token stop) { return Call("stop", {}, std::move(stop)); }

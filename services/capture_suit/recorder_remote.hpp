@@ -10,7 +10,9 @@ namespace exemplar::capture_suit {
 /// Tells the recorder when a trial starts and ends, over ircp/recorder/command. Thread-compatible.
 class RecorderRemote {
  public:
-  static Result<RecorderRemote> Create(ircp::Bus& bus, const Clock& clock, std::uint64_t seed);
+  /// `demonstrator`: whose demonstrations are recorded, a pseudonymous id; empty: not said.
+  static Result<RecorderRemote> Create(ircp::Bus& bus, const Clock& clock, std::uint64_t seed,
+                                       const std::string& demonstrator = {});
 
   /// After `stop` the recorder gets half a second to answer.
   Status Start(const std::string& name, const std::string& source, std::stop_token stop);
@@ -18,10 +20,11 @@ class RecorderRemote {
   Status Stop(std::stop_token stop);
 
  private:
-  explicit RecorderRemote(std::unique_ptr<ircp::ControlClient> client);
+  RecorderRemote(std::unique_ptr<ircp::ControlClient> client, std::string demonstrator);
   Status Call(const std::string& action, std::map<std::string, std::string> arguments,
               std::stop_token stop);
   std::unique_ptr<ircp::ControlClient> client_;
+  std::string demonstrator_;
 };
 
 /// The recording's name of trial `index` (from 0) of `count`: `name` itself for a single one, else

@@ -8,6 +8,7 @@
 
 #include "exemplar/base/text.hpp"
 #include "exemplar/demonstration/csv.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::capture_suit {
 namespace {
@@ -51,7 +52,8 @@ Result<std::unique_ptr<ReplaySession>> ReplaySession::Create(
   std::unique_ptr<ReplaySession> session(
       new ReplaySession(clock, log, std::move(trials), std::move(*streams), options));
   if (options.record) {
-    Result<RecorderRemote> recorder = RecorderRemote::Create(bus, clock, options.seed);
+    Result<RecorderRemote> recorder =
+        RecorderRemote::Create(bus, clock, options.seed, options.demonstrator);
     if (!recorder) return recorder.error();
     session->recorder_ = std::move(*recorder);
   }
@@ -94,7 +96,8 @@ Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
   const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);
   Status played = streams_.Play(samples, options_.rate, clock_, stop);
   if (dead_man_) dead_man_->Release();
-  if (played && !streams_.WaitForAcknowledgments(kAcknowledgeTimeout, clock_, stop)) {
+  if (played &&
+      !streams_.WaitForAcknowledgments(kAcknowledgeTimeout, ircp::RealTimeOf(clock_), stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", trial.source}});
   }
   control_->SetState("idle", trial.source + " played");
@@ -143,9 +146,11 @@ std::vector<ircp::TopicCount> ReplaySession::sent() const {
 }
 
 void ReplaySession::WaitForReaders(std::stop_token stop) {
-  const Duration deadline = clock_.Steady() + kReaderTimeout;
-  while (!streams_.UnreadTopics().empty() && clock_.Steady() < deadline) {
-    if (!clock_.SleepFor(kPollInterval, stop)) return;
+  const ircp::TimeHold hold(clock_);
+  const Clock& real = ircp::RealTimeOf(clock_);
+  const Duration deadline = real.Steady() + kReaderTimeout;
+  while (!streams_.UnreadTopics().empty() && real.Steady() < deadline) {
+    if (!real.SleepFor(kPollInterval, stop)) return;
   }
   for (const std::string& topic : streams_.UnreadTopics()) {
     log_.Warning("nobody reads", {{"topic", topic}});

@@ -21,12 +21,13 @@
 namespace exemplar::capture_suit {
 
 struct ReplayOptions {
-  double rate = 1;             ///< so many times faster than recorded
-  bool dead_man = false;       ///< hold it, and begin when the robot follows
-  bool record = false;         ///< tell the recorder to start and stop around each trial
-  std::string name = {};       ///< of the recordings
-  std::string frame = "base";  ///< the frame of the files' poses
-  std::uint64_t seed = 1;      ///< of request ids
+  double rate = 1;                ///< so many times faster than recorded
+  bool dead_man = false;          ///< hold it, and begin when the robot follows
+  bool record = false;            ///< tell the recorder to start and stop around each trial
+  std::string name = {};          ///< of the recordings
+  std::string demonstrator = {};  ///< whose demonstrations: a pseudonymous id for the recordings
+  std::string frame = "base";     ///< the frame of the files' poses
+  std::uint64_t seed = 1;         ///< of request ids
 };
 
 /// Reads a trial CSV. Errors name file, line and column.

@@ -3,6 +3,7 @@
 #include "capture_tactile/metrics.hpp"
 #include "capture_tactile/session.hpp"
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/bus/station_clock.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 
@@ -12,7 +13,8 @@ int main(int argc, char** argv) {
   bool from_robot = false;
   capture_tactile::SessionOptions session_options;
   program::Options options(kName, "Sends touch forces on ircp/tactile",
-                           "exemplar-capture-tactile --from-robot --station lab", {.bus = true});
+                           "exemplar-capture-tactile --from-robot --station lab",
+                           {.bus = true, .clock = true});
   options.Add("--from-robot", from_robot, "the robot's own hand, from ircp/joint_state").Required();
   options.Add("--rate-hz", session_options.rate_hz, "how often the newest force is sent")
       .MinMax(1, 1000);
@@ -20,24 +22,28 @@ int main(int argc, char** argv) {
 
   const program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "capture-tactile");
-  const SystemClock clock;
-  auto participant =
-      bus::Participant::Create({.domain = options.common().domain,
-                                .station = options.common().station,
-                                .name = kName,
-                                .interfaces = options.common().interfaces,
-                                .peers = options.common().peers,
-                                .discovery_servers = options.common().discovery_servers,
-                                .best_effort_topics = options.common().best_effort,
-                                .security = options.common().security,
-                                .clock = &clock,
-                                .log = log.get()});
+  bus::ParticipantOptions network{.domain = options.common().domain,
+                                  .station = options.common().station,
+                                  .name = kName,
+                                  .interfaces = options.common().interfaces,
+                                  .peers = options.common().peers,
+                                  .discovery_servers = options.common().discovery_servers,
+                                  .best_effort_topics = options.common().best_effort,
+                                  .security = options.common().security,
+                                  .log = log.get()};
+  auto station_clock = bus::StationClock::Create(options.common().clock, network, "capture_tactile",
+                                                 signals.token());
+  if (!station_clock) return program::Fail(kName, station_clock.error());
+  const Clock& clock = **station_clock;
+  auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
-  auto session = capture_tactile::Session::Create(**participant, clock, *log, session_options);
+  auto session = capture_tactile::Session::Create(station_clock->bus(**participant), clock, *log,
+                                                  session_options);
   if (!session) return program::Fail(kName, session.error());
   const auto metrics =
       program::ServeMetrics(options.common(), capture_tactile::MetricsOf(**session));
   if (!metrics) return program::Fail(kName, metrics.error());
+  station_clock->Begin(ircp::NetworkClock::Caller::kSleeps, *log, signals.token());
   (*session)->Run(signals.token());
   return 0;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "exemplar/ircp/control.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 #include "exemplar/perception/picture.hpp"
 
 namespace exemplar::capture_vision {
@@ -21,8 +22,12 @@ constexpr const char* kFrame = "base";
 class RunningSession final : public Session {
  public:
   RunningSession(const Clock& clock, Log& log,
-                 std::map<std::string, perception::ObjectFinder> finders)
-      : clock_(clock), log_(log), finders_(std::move(finders)) {}
+                 std::map<std::string, perception::ObjectFinder> finders,
+                 std::function<void()> on_settled)
+      : clock_(clock),
+        log_(log),
+        finders_(std::move(finders)),
+        on_settled_(std::move(on_settled)) {}
 
   Status Connect(ircp::Bus& bus, const Clock& clock) {
     auto writer = bus.MakeWriter<ircp::ObjectSample>(kSource);
@@ -49,18 +54,28 @@ class RunningSession final : public Session {
     std::unique_lock lock(mutex_);
     while (arrived_.wait(lock, stop, [this] { return !newest_.empty(); })) {
       const auto node = newest_.extract(newest_.begin());
+      is_searching_ = true;
       lock.unlock();
-      const Duration begin = clock_.Steady();
+      const Clock& real = ircp::RealTimeOf(clock_);
+      const Duration begin = real.Steady();
       Search(node.mapped());
-      const Duration end = clock_.Steady();
+      const Duration end = real.Steady();
       lock.lock();
       searching_ += end - begin;
+      is_searching_ = false;
+      lock.unlock();
+      on_settled_();
+      lock.lock();
     }
     lock.unlock();
     control_->SetState("stopped", "asked to stop");
     log_.Info("stopped");
   }
 
+  bool is_settled() const override {
+    const std::lock_guard lock(mutex_);
+    return newest_.empty() && !is_searching_;
+  }
   Counts counts() const override {
     const std::lock_guard lock(mutex_);
     return counts_;
@@ -161,10 +176,13 @@ class RunningSession final : public Session {
   Log& log_;
   const std::map<std::string, perception::ObjectFinder> finders_;  ///< by calibration id
 
-  mutable std::mutex mutex_;  ///< guards newest_, counts_ and searching_
+  const std::function<void()> on_settled_;
+
+  mutable std::mutex mutex_;  ///< guards what follows, up to searching_
   std::condition_variable_any arrived_;
   std::map<std::string, ircp::CameraSample> newest_;  ///< by calibration id
   Counts counts_;
+  bool is_searching_ = false;
   Duration searching_{0};
 
   // Of the thread that runs.
@@ -193,7 +211,8 @@ Result<std::unique_ptr<Session>> Session::Create(ircp::Bus& bus, const Clock& cl
     if (!finder) return finder.error();
     finders.emplace(camera.name, std::move(finder).value());
   }
-  auto session = std::make_unique<RunningSession>(clock, log, std::move(finders));
+  auto session =
+      std::make_unique<RunningSession>(clock, log, std::move(finders), options.on_settled);
   if (Status status = session->Connect(bus, clock); !status) return status.error();
   return std::unique_ptr<Session>(std::move(session));
 }

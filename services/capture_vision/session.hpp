@@ -2,6 +2,7 @@
 // Where the marked objects are, from the stereo pictures on ircp/camera, onto ircp/objects.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <stop_token>
 #include <vector>
@@ -17,6 +18,8 @@ namespace exemplar::capture_vision {
 
 struct SessionOptions {
   perception::FinderOptions finder = {};
+  /// Told when a picture has been dealt with.
+  std::function<void()> on_settled = [] {};
 };
 
 /// What came of the pictures.
@@ -47,6 +50,8 @@ class Session {
   /// Works until `stop`. Call once.
   virtual void Run(std::stop_token stop) = 0;
 
+  /// Whether every picture that came has been dealt with. Thread-safe.
+  virtual bool is_settled() const = 0;
   // For metrics; thread-safe.
   virtual Counts counts() const = 0;
   virtual double search_seconds() const = 0;

@@ -32,6 +32,9 @@ Status Executor::ConnectTeleoperation(ircp::Bus& bus) {
     }
     changed_.notify_all();
   };
+  host.on_settled = [this] {
+    if (options_.on_taken) options_.on_taken();
+  };
   TeleoperationSettings settings;
   settings.following = options_.teleoperation;
   settings.rate_hz = options_.rate_hz;

@@ -148,19 +148,15 @@ int main(int argc, char** argv) {
                                   .best_effort_topics = options.common().best_effort,
                                   .security = options.common().security,
                                   .log = log.get()};
-  bus::StationClock station_clock;
-  if (options.common().clock == "network") {
-    auto followed = bus::StationClock::Follow(network, "executor", signals.token());
-    if (!followed.ok()) return program::Fail(kName, followed.error());
-    station_clock = std::move(*followed);
-  }
-  const Clock& clock = *station_clock;
-  network.clock = &clock;
+  auto station_clock =
+      bus::StationClock::Create(options.common().clock, network, "executor", signals.token());
+  if (!station_clock.ok()) return program::Fail(kName, station_clock.error());
+  const Clock& clock = **station_clock;
   auto participant = bus::Participant::Create(network);
   if (!participant.ok()) return program::Fail(kName, participant.error());
-  settings.on_taken = [&station_clock] { station_clock.Recheck(); };
-  auto app = executor::Executor::Create(**participant, clock, *log, *clients->skills, *robot,
-                                        *scene, settings);
+  settings.on_taken = [&station_clock] { station_clock->Recheck(); };
+  auto app = executor::Executor::Create(station_clock->bus(**participant), clock, *log,
+                                        *clients->skills, *robot, *scene, settings);
   if (!app.ok()) return program::Fail(kName, app.error());
   rpc::CallLog calls(*log);
   auto server = rpc::Server::Create(
@@ -179,14 +175,12 @@ int main(int argc, char** argv) {
   if (!metrics.ok()) return program::Fail(kName, metrics.error());
   log->Info("serving", {{"address", (*server)->address()}, {"robot", robot->name}});
 
-  station_clock.SetCommandsSent([&app] { return (*app)->CommandsSent(); });
-  station_clock.SetInputsTaken(
-      [&app](const ircp::SentInputs& sent) { return (*app)->HasTaken(sent); });
+  station_clock->SetSettled([&app] { return (*app)->IsSettled(); });
+  station_clock->Begin(ircp::NetworkClock::Caller::kOnlyWaits, *log, signals.token());
   signals.Wait();
   (*app)->Shutdown();
   (*server)->Shutdown(std::chrono::seconds(1));
-  station_clock.SetCommandsSent(nullptr);
-  station_clock.SetInputsTaken(nullptr);
+  station_clock->SetSettled(nullptr);
   log->Info("stopped");
   return 0;
 }

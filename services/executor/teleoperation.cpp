@@ -314,6 +314,7 @@ void Teleoperation::StepLoop(const std::stop_token& stop) {
     if (active()) Step();
     stepped_.store(seen, std::memory_order_release);
     stepped_.notify_all();
+    host_.on_settled();
   }
   stepped_.store(wake_.load() + (1U << 30), std::memory_order_release);
   stepped_.notify_all();

@@ -45,6 +45,8 @@ struct TeleoperationHost {
   std::function<double()> speed;
   /// The robot rests where it was commanded last; nothing is commanded any more.
   std::function<void(const Eigen::VectorXd& commanded)> over;
+  /// Told when all that came may have been dealt with.
+  std::function<void()> on_settled;
 };
 
 struct TeleoperationSettings {
@@ -86,6 +88,10 @@ class Teleoperation {
 
   void Measure(const MeasuredState& state);
   void Take(const ircp::SafetySample& sample);
+  /// Whether all that came has been followed and watched.
+  bool IsSettled() const {
+    return wake_.load() == stepped_.load() && work_.load() == watched_.load();
+  }
 
   TeleoperationFigures figures() const;
   const ircp::Reader* suit_reader() const { return suit_reader_.get(); }
@@ -150,6 +156,7 @@ class Teleoperation {
   std::atomic<std::uint32_t> wake_{0};     ///< grows when there is something for the step
   std::atomic<std::uint32_t> stepped_{0};  ///< the wake_ that was answered last
   std::atomic<std::uint32_t> work_{0};     ///< grows when there is something for the watch
+  std::atomic<std::uint32_t> watched_{0};  ///< the work_ that was done last
   std::atomic<std::uint32_t> due_{0};      ///< grows when something is to be told
   std::atomic<std::uint32_t> beat_{0};     ///< grows when there is something to feed back
   std::atomic<std::int64_t> next_tick_ns_{0};

@@ -2,6 +2,7 @@
 
 #include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/bus/station_clock.hpp"
 #include "exemplar/ircp/clock_watch.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
@@ -11,13 +12,14 @@
 #include "recorder/metrics.hpp"
 #include "recorder/program_options.hpp"
 #include "recorder/recorder.hpp"
+#include "recorder/recordings.hpp"
 
 int main(int argc, char** argv) {
   using namespace exemplar;
   constexpr const char* kName = "exemplar-recorder";
   program::Options options(kName, "Records a station's topics into MCAP files",
                            "exemplar-recorder --station lab --data-dir /var/lib/exemplar",
-                           {.bus = true, .server = true, .data = true});
+                           {.bus = true, .server = true, .data = true, .clock = true});
   recorder::ProgramOptions words;
   words.AddTo(options);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
@@ -25,23 +27,32 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(common, "recorder");
-  const SystemClock clock;
-  auto participant =
-      bus::Participant::Create({.domain = common.domain,
-                                .station = common.station,
-                                .name = kName,
-                                .interfaces = common.interfaces,
-                                .peers = common.peers,
-                                .discovery_servers = common.discovery_servers,
-                                .best_effort_topics = common.best_effort,
-                                .shared_memory_bytes = bus::kPictureSharedMemoryBytes,
-                                .security = common.security,
-                                .clock = &clock,
-                                .log = log.get()});
+  bus::ParticipantOptions network{.domain = common.domain,
+                                  .station = common.station,
+                                  .name = kName,
+                                  .interfaces = common.interfaces,
+                                  .peers = common.peers,
+                                  .discovery_servers = common.discovery_servers,
+                                  .best_effort_topics = common.best_effort,
+                                  .shared_memory_bytes = bus::kPictureSharedMemoryBytes,
+                                  .security = common.security,
+                                  .log = log.get()};
+  auto station_clock =
+      bus::StationClock::Create(common.clock, network, "recorder", signals.token());
+  if (!station_clock) return program::Fail(kName, station_clock.error());
+  const Clock& clock = **station_clock;
+  auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
 
-  const auto clocks = ircp::ClockWatch::Create(**participant, clock, *log, "recorder");
-  if (!clocks) return program::Fail(kName, clocks.error());
+  ircp::Bus& bus = station_clock->bus(**participant);
+  // In simulated time there is but one clock.
+  std::unique_ptr<ircp::ClockWatch> clocks;
+  if (!station_clock->is_simulated()) {
+    auto watch = ircp::ClockWatch::Create(bus, clock, *log, "recorder");
+    if (!watch) return program::Fail(kName, watch.error());
+    clocks = std::move(*watch);
+  }
+  const auto clock_jumps = [&clocks] { return clocks ? clocks->jumps() : 0; };
   std::unique_ptr<recorder::Recorder> recorder;
   // Ends before the recorder that it commands; shared, so that the recorder can see that it has.
   const auto control = std::make_shared<recorder::ControlLink>();
@@ -49,21 +60,25 @@ int main(int argc, char** argv) {
   settings.data_dir = common.data_dir;
   settings.station = common.station;
   if (const Status read = words.Apply(settings); !read) return program::Fail(kName, read.error());
-  settings.clocks = [&clocks] { return (*clocks)->relations(); };
+  if (clocks) settings.clocks = [&clocks] { return clocks->relations(); };
+  if (station_clock->is_simulated()) settings.unwanted = {ircp::ClockSample::kTopic};
   settings.on_change = [link = std::weak_ptr(control)](const std::string& state,
                                                        const std::string& detail) {
     if (const auto told = link.lock()) told->Tell(state, detail);
   };
-  auto made = recorder::Recorder::Create(**participant, clock, *log,
+  auto made = recorder::Recorder::Create(station_clock->raw_bus(**participant), clock, *log,
                                          bus::Decode<ircp::StatusSample>, std::move(settings));
   if (!made) return program::Fail(kName, made.error());
   recorder = std::move(*made);
   api::RecorderApi& api = *recorder;
 
-  const Status linked = control->Open(**participant, clock, *log, api, [&clocks] {
-    return std::map<std::string, std::string>{{"clock_jumps", std::to_string((*clocks)->jumps())}};
+  const Status linked = control->Open(bus, clock, *log, api, [&clock_jumps] {
+    return std::map<std::string, std::string>{{"clock_jumps", std::to_string(clock_jumps())}};
   });
   if (!linked) return program::Fail(kName, linked.error());
+  const auto recordings = recorder::Recordings::Create(
+      api, clock, *log, {.data_dir = common.data_dir, .keep_days = words.keep_days()});
+  if (!recordings) return program::Fail(kName, recordings.error());
   rpc::CallLog calls(*log);
   auto server = rpc::Server::Create(
       {.listen = common.listen,
@@ -71,18 +86,18 @@ int main(int argc, char** argv) {
        .credentials = common.server,
        .log = log.get(),
        .on_call = [&calls](const rpc::CallRecord& call) { calls.Record(call); }},
-      {.recorder = &api});
+      {.recorder = &api, .recorder_data = recordings->get()});
   if (!server) return program::Fail(kName, server.error());
   std::vector<Metric> figures = recorder::MetricsOf(api);
   for (Metric& metric : rpc::MetricsOf(calls, "exemplar_recorder")) {
     figures.push_back(std::move(metric));
   }
   figures.push_back(CounterOf("exemplar_recorder_clock_jumps_total",
-                              "Clocks of the station's programs that jumped",
-                              [&clocks] { return (*clocks)->jumps(); }));
+                              "Clocks of the station's programs that jumped", clock_jumps));
   const auto metrics = program::ServeMetrics(common, std::move(figures));
   if (!metrics) return program::Fail(kName, metrics.error());
   log->Info("ready", {{"address", (*server)->address()}, {"data_dir", common.data_dir}});
+  station_clock->Begin(ircp::NetworkClock::Caller::kOnlyWaits, *log, signals.token());
   signals.Wait();
   (*server)->Shutdown(std::chrono::seconds(1));
   recorder->Close();

@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "exemplar/api/data.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 #include "recorder/clock_marks.hpp"
 #include "recorder/folder.hpp"
 #include "recorder/intake.hpp"
@@ -25,6 +27,7 @@ class RecorderImpl final : public Recorder {
  public:
   RecorderImpl(const Clock& clock, Log& log, StatusDecoder decode_status, RecorderOptions options)
       : clock_(clock),
+        real_(ircp::RealTimeOf(clock)),
         log_(log),
         options_(std::move(options)),
         intake_(clock, log,
@@ -42,7 +45,11 @@ class RecorderImpl final : public Recorder {
 
   Status Open(ircp::RawBus& bus) {
     ircp::RawTapOptions tap;
-    tap.wanted = options_.wanted;
+    tap.wanted = [this](const ircp::RawTopic& topic) {
+      const std::vector<std::string>& unwanted = options_.unwanted;
+      return options_.wanted(topic) &&
+             std::find(unwanted.begin(), unwanted.end(), topic.topic) == unwanted.end();
+    };
     tap.on_topic = [this](const ircp::RawTopic& topic) { intake_.AddTopic(topic); };
     tap.on_sample = [this](ircp::RawSample&& sample) { intake_.Add(std::move(sample)); };
     Result<std::unique_ptr<ircp::RawTap>> made = bus.MakeTap(std::move(tap));
@@ -94,6 +101,11 @@ class RecorderImpl final : public Recorder {
     const Stamp now = clock_.Now();
     const std::string name = request.name.empty() ? NameFromTime(now) : request.name;
     if (const Status valid = CheckRecordingName(name); !valid.ok()) return valid.error();
+    if (const auto person = request.metadata.find("person"); person != request.metadata.end()) {
+      if (const Status valid = api::CheckPerson(person->second, "metadata.person"); !valid.ok()) {
+        return valid.error();
+      }
+    }
     if (!(request.split_s >= 0)) {
       return InvalidArgument(
           "split_s is " + FormatDouble(request.split_s) + ", must not be negative", "split_s");
@@ -114,7 +126,7 @@ class RecorderImpl final : public Recorder {
     {
       const std::lock_guard lock_file(file_mutex_);
       file_ = std::move(*file);
-      last_flush_ = clock_.Steady();
+      last_flush_ = real_.Steady();
       last_losses_ = last_flush_;
       loss_interval_ = kFirstLossInterval;
       losses_written_.clear();
@@ -292,7 +304,7 @@ class RecorderImpl final : public Recorder {
 
   /// Syncs, and notes new losses, when it is time. Precondition: file_mutex_ is held.
   Status KeepPromises() {
-    const Duration now = clock_.Steady();
+    const Duration now = real_.Steady();
     // A sample has waited for half of the interval at the most, and the next look is as far away.
     if (now - last_flush_ < options_.flush_interval / 4) return {};
     last_flush_ = now;
@@ -301,7 +313,7 @@ class RecorderImpl final : public Recorder {
       loss_interval_ = std::min(2 * loss_interval_, kLongestLossInterval);
       if (const Status s = file_->WriteLosses(NewLosses()); !s.ok()) return s;
     }
-    if (const Status s = clock_marks_.WriteIfDue(*file_, now); !s.ok()) return s;
+    if (const Status s = clock_marks_.WriteIfDue(*file_, clock_.Steady()); !s.ok()) return s;
     return file_->Flush();
   }
 
@@ -329,30 +341,30 @@ class RecorderImpl final : public Recorder {
     }
     std::vector<std::string> expected = options_.expected_topics;
     expected.insert(expected.end(), request.expected_topics.begin(), request.expected_topics.end());
-    const Duration deadline = clock_.Steady() + FromSeconds(request.timeout_s);
+    const Duration deadline = real_.Steady() + FromSeconds(request.timeout_s);
     while (true) {
       std::vector<std::string> missing;
       for (const std::string& topic : expected) {
         if (tap_->matched_writers(topic) == 0) missing.push_back(topic);
       }
       if (missing.empty()) return {};
-      if (clock_.Steady() >= deadline) {
+      if (real_.Steady() >= deadline) {
         return Error{ErrorCode::kDeadlineExceeded,
                      "no writer of " + Join(missing, ", ") + " after " +
                          FormatDouble(request.timeout_s) + " s",
                      "expected_topics"};
       }
-      clock_.SleepFor(kPoll);
+      real_.SleepFor(kPoll);
     }
   }
 
   /// Waits for samples that were sent before the stop but have not come yet.
   void Settle() {
-    const Duration deadline = clock_.Steady() + options_.settle_time;
+    const Duration deadline = real_.Steady() + options_.settle_time;
     do {
-      clock_.SleepFor(kPoll);
+      real_.SleepFor(kPoll);
       if (intake_.HasAllAnnounced()) return;
-    } while (clock_.Steady() < deadline);
+    } while (real_.Steady() < deadline);
   }
 
   Result<api::RecorderStatus> Switch(Event event, const std::string& detail,
@@ -481,6 +493,7 @@ class RecorderImpl final : public Recorder {
   }
 
   const Clock& clock_;
+  const Clock& real_;  ///< for what the network and the disk take
   Log& log_;
   const RecorderOptions options_;
   Intake intake_;

@@ -21,6 +21,8 @@ struct RecorderOptions {
   std::function<bool(const ircp::RawTopic&)> wanted = [](const ircp::RawTopic& topic) {
     return topic.topic.starts_with("ircp/");
   };
+  /// Of these, topics that are not.
+  std::vector<std::string> unwanted = {};
   /// Samples between network and disk may take this much; what comes beyond is dropped and counted.
   std::size_t queue_bytes = std::size_t{64} << 20;
   /// What came before an event and is kept for it: at least this long, as far as these bytes allow

@@ -65,6 +65,11 @@ class DrawnCameras final : public Cameras {
     }
   }
 
+  void Flush() override {
+    std::unique_lock lock(mutex_);
+    drawn_.wait(lock, [this] { return orders_.empty() && !drawing_; });
+  }
+
   std::uint64_t skipped() const override {
     const std::lock_guard lock(mutex_);
     return skipped_;
@@ -84,9 +89,12 @@ class DrawnCameras final : public Cameras {
     while (changed_.wait(lock, stop, [this] { return !orders_.empty(); })) {
       const Order order = std::move(orders_.front());
       orders_.pop_front();
+      drawing_ = true;
       lock.unlock();
       Publish(renderer, order);
       lock.lock();
+      drawing_ = false;
+      drawn_.notify_all();
     }
   }
 
@@ -115,9 +123,11 @@ class DrawnCameras final : public Cameras {
   Log& log_;
   std::vector<Camera> cameras_;
   const CameraOptions options_;
-  mutable std::mutex mutex_;  ///< guards orders_ and skipped_
+  mutable std::mutex mutex_;  ///< guards the orders and what is counted
   std::condition_variable_any changed_;
+  std::condition_variable drawn_;
   std::deque<Order> orders_;
+  bool drawing_ = false;
   std::uint64_t skipped_ = 0;
   std::jthread thread_;  ///< last: ends before what it uses goes
 };

@@ -30,6 +30,8 @@ class Cameras {
   /// Takes pictures with every camera that is due at `world`'s time; `stamp` is the same time on
   /// the wall clock. Skips and counts those whose last picture is still being drawn.
   virtual void Look(const World& world, Stamp stamp) = 0;
+  /// Returns when the pictures taken so far have been sent.
+  virtual void Flush() = 0;
   virtual std::uint64_t skipped() const = 0;
   virtual std::vector<ircp::TopicCount> sent() const = 0;
 };

@@ -38,7 +38,8 @@ int main(int argc, char** argv) {
   options.Add("--pace", settings.pace, "simulated seconds a second; 0: as many as can be")
       .MinMax(0, 1000);
   options.Add("--in-step-with", settings.in_step_with,
-              "programs that run with --clock network: the simulated time waits for them");
+              "programs that run with --clock network: the simulated time waits for them; "
+              "NAME@SECONDS: from that simulated time on");
   double stand_after_s = 0;
   options
       .Add("--stand-after-s", stand_after_s,
@@ -68,7 +69,8 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "simulator");
-  const SystemClock clock;
+  ircp::LeaderClock clock;
+  settings.leader_clock = &clock;
   settings.leader = follow == "suit" ? simulator::Leader::kSuit : simulator::Leader::kCommand;
   settings.cameras = cameras == "on";
   settings.world.step = FromSeconds(1e-3 * step_ms);
@@ -81,16 +83,18 @@ int main(int argc, char** argv) {
   if (!robot) return program::Fail(kName, robot.error());
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene) return program::Fail(kName, scene.error());
-  bus::ParticipantOptions network{.domain = options.common().domain,
-                                  .station = options.common().station,
-                                  .name = kName,
-                                  .interfaces = options.common().interfaces,
-                                  .peers = options.common().peers,
-                                  .discovery_servers = options.common().discovery_servers,
-                                  .best_effort_topics = options.common().best_effort,
-                                  .security = options.common().security,
-                                  .clock = &clock,
-                                  .log = log.get()};
+  bus::ParticipantOptions network{
+      .domain = options.common().domain,
+      .station = options.common().station,
+      .name = kName,
+      .interfaces = options.common().interfaces,
+      .peers = options.common().peers,
+      .discovery_servers = options.common().discovery_servers,
+      .best_effort_topics = options.common().best_effort,
+      .security = options.common().security,
+      .clock = &clock,
+      .stamps_all = settings.pace != 1 || !settings.in_step_with.empty(),
+      .log = log.get()};
   auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
   std::unique_ptr<bus::Participant> pictures;

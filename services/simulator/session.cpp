@@ -15,7 +15,6 @@
 #include "exemplar/base/text.hpp"
 #include "exemplar/ircp/clock_watch.hpp"
 #include "exemplar/ircp/control.hpp"
-#include "exemplar/ircp/simulated_time.hpp"
 #include "simulator/cameras.hpp"
 #include "simulator/outbox.hpp"
 #include "simulator/placing.hpp"
@@ -151,9 +150,11 @@ class RunningSession final : public Session {
       // A person's glove: what it says of the hand's opening.
       auto glove = bus.MakeReader<ircp::EndEffectorSample>(
           [this](const ircp::EndEffectorSample& s, const ircp::Reception&) {
-            if (!s.has_hand_open || !std::isfinite(s.hand_open)) return;
-            const std::lock_guard lock(mutex_);
-            hand_open_ = std::clamp(s.hand_open, 0.0, 1.0);
+            if (s.has_hand_open && std::isfinite(s.hand_open)) {
+              const std::lock_guard lock(mutex_);
+              hand_open_ = std::clamp(s.hand_open, 0.0, 1.0);
+            }
+            NoteArrival(ircp::EndEffectorSample::kTopic, s.header);
           });
       if (!glove) return glove.error();
       glove_reader_ = std::move(glove).value();
@@ -226,15 +227,20 @@ class RunningSession final : public Session {
   void RunInStep(const std::stop_token& stop) {
     const Stamp epoch = options_.epoch.value_or(clock_.Now()) - world_.time();
     const Duration begin = clock_.Steady();
-    const auto taken = [this](const std::string& program) {
+    const auto has_come = [this](const ircp::TopicCount& count) {
       const std::lock_guard lock(inbox_mutex_);
-      const auto it = last_seq_.find(program);
-      return it == last_seq_.end() ? 0 : it->second;
+      const bool is_read = count.topic == leader_topic() ||
+                           (glove_reader_ && count.topic == ircp::EndEffectorSample::kTopic);
+      if (!is_read) return true;
+      const auto it = last_seq_.find({count.topic, count.source});
+      return it != last_seq_.end() && it->second >= count.sent;
     };
     const auto lead = [&] {
       states_->Flush();
-      const ircp::SentInputs sent{state_writer_->sent(), tracked_ ? object_writer_->sent() : 0};
-      return time_->Lead(world_.time(), epoch + world_.time(), sent, taken, stop);
+      if (cameras_) cameras_->Flush();
+      const Stamp now = epoch + world_.time();
+      if (options_.leader_clock) options_.leader_clock->Set(now);
+      return time_->Lead(world_.time(), now, sent(), has_come, stop);
     };
     for (double beats = 1; lead(); ++beats) {
       if (!StandUntilCommanded(lead, stop)) return;
@@ -442,10 +448,18 @@ class RunningSession final : public Session {
         inbox_.pop_front();  // The newest matters.
         ++overrun_;
       }
-      last_seq_[arrival.header.source] = arrival.header.seq;
+      last_seq_[{leader_topic(), arrival.header.source}] = arrival.header.seq;
       inbox_.push_back(std::move(arrival));
     }
     arrived_.notify_one();
+    if (is_leading_.load()) time_->Recheck();
+  }
+
+  void NoteArrival(const std::string& topic, const ircp::Header& header) {
+    {
+      const std::lock_guard lock(inbox_mutex_);
+      last_seq_[{topic, header.source}] = header.seq;
+    }
     if (is_leading_.load()) time_->Recheck();
   }
 
@@ -528,7 +542,7 @@ class RunningSession final : public Session {
   mutable std::mutex inbox_mutex_;
   std::condition_variable_any arrived_;
   std::deque<Arrival> inbox_;
-  std::map<std::string, std::uint64_t> last_seq_;  ///< by who sent it
+  std::map<std::pair<std::string, std::string>, std::uint64_t> last_seq_;  ///< by topic and source
   std::uint64_t overrun_ = 0;
 
   std::unique_ptr<ircp::ClockResponder> picture_clock_;  ///< null: pictures go by the one bus

@@ -14,6 +14,7 @@
 #include "exemplar/base/log.hpp"
 #include "exemplar/base/result.hpp"
 #include "exemplar/ircp/bus.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
 #include "exemplar/scene/description.hpp"
 #include "simulator/follower.hpp"
@@ -60,6 +61,9 @@ struct SessionOptions {
   Duration stand_after{0};
   /// In step: what the wall clock says at the beginning; the machine's, when absent.
   std::optional<Stamp> epoch = {};
+  /// Set to the simulated wall time where that goes out; whoever stamps the session's samples and
+  /// answers for it goes by this clock. May be null; outlives the session.
+  ircp::LeaderClock* leader_clock = nullptr;
   /// From a command's arrival until the servos hear of it.
   Duration command_delay{0};
   SensorNoise noise = {};

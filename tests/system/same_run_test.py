@@ -10,11 +10,11 @@ import shutil
 import tempfile
 import time
 import unittest
-import urllib.request
 
 import recorded
 import trials
 from processes import Programs, exemplar, wait_for
+from station import metric
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ROBOT = ROOT / "deploy" / "models" / "arm7"
@@ -22,6 +22,7 @@ SCENE = ROOT / "deploy" / "config" / "rail_press.yaml"
 BUTTONS = [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06)]
 PLACE = "target=0.55,-0.15,0.05,0,0,0,1"
 STANDS_AFTER_S = 0.6
+METRICS = "127.0.0.1:19771"
 COMPARED = ["ircp/joint_command", "ircp/joint_state", "ircp/objects"]
 
 
@@ -38,7 +39,7 @@ class Run:
         self.programs.start(
             "exemplar-simulator", "--robot", ROBOT, "--scene", SCENE, "--cameras", "off", "--pace", "0", "--in-step-with",
             "executor", "--stand-after-s", STANDS_AFTER_S, "--epoch-s", "1700000000", "--track-hz", "25",
-            "--noise-position", "1e-4", "--noise-touch", "0.02", "--noise-object", "1e-4", "--metrics", "127.0.0.1:19771", *words,
+            "--noise-position", "1e-4", "--noise-touch", "0.02", "--noise-object", "1e-4", "--metrics", METRICS, *words,
         )  # fmt: skip
         _, self.recorder = self.programs.recorder()
         self.executor = self.server(
@@ -52,17 +53,12 @@ class Run:
         wait_for(lambda: port_file.exists() and port_file.read_text().strip(), f"the port of {program}")
         return "127.0.0.1:" + port_file.read_text().strip().rsplit(":", 1)[-1]
 
-    def metric(self, name):
-        with urllib.request.urlopen("http://127.0.0.1:19771/metrics", timeout=5) as answer:
-            lines = answer.read().decode().splitlines()
-        return float(next(line.split()[1] for line in lines if line.startswith(name + " ")))
-
     def time_s(self):
-        return self.metric("exemplar_simulator_time_seconds")
+        return metric(METRICS, "exemplar_simulator_time_seconds")
 
     def wait_until_time_stands(self):
         """Nobody commands the robot, so time comes to a stand."""
-        wait_for(lambda: self.metric("exemplar_simulator_time_stands") == 1, "the simulated time to stand still", 60)
+        wait_for(lambda: metric(METRICS, "exemplar_simulator_time_stands") == 1, "the simulated time to stand still", 60)
 
     def press(self, place):
         """Presses once; simulated and real seconds that it took."""

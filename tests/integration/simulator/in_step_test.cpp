@@ -4,8 +4,8 @@
 #include <mutex>
 #include <thread>
 
+#include "exemplar/ircp/in_step_bus.hpp"
 #include "exemplar/ircp/memory_bus.hpp"
-#include "exemplar/ircp/simulated_time.hpp"
 #include "pressing.hpp"
 #include "robots.hpp"
 #include "simulator/session.hpp"
@@ -66,8 +66,8 @@ class InStep : public ::testing::Test {
           run.touch_n.push_back(sample.touch_n.front());
         });
     const auto clock = std::move(*ircp::NetworkClock::Create(bus, "executor"));
-    const auto writer = *bus.MakeWriter<ircp::JointCommandSample>("executor");
-    clock->SetCommandsSent([&] { return writer->sent(); });
+    ircp::InStepBus in_step(bus, bus, nullptr, *clock);
+    const auto writer = *in_step.MakeWriter<ircp::JointCommandSample>("executor");
     std::jthread controller([&](const std::stop_token& stop) {
       for (Duration at = FromSeconds(kBegin_s); clock->SleepUntil(at, stop); at += kBeat) {
         const Eigen::VectorXd q = TargetAt(ToSeconds(at));

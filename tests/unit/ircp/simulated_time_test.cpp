@@ -5,6 +5,8 @@
 #include <atomic>
 #include <thread>
 
+#include "exemplar/ircp/control.hpp"
+#include "exemplar/ircp/in_step_bus.hpp"
 #include "exemplar/ircp/memory_bus.hpp"
 #include "support/eventually.hpp"
 
@@ -14,7 +16,7 @@ namespace {
 using std::chrono::milliseconds;
 using testing::Eventually;
 
-constexpr auto kTakenAll = [](const std::string&) -> std::uint64_t { return 0; };
+constexpr auto kAllHasCome = [](const TopicCount&) { return true; };
 
 class SimulatedTime : public ::testing::Test {
  protected:
@@ -30,7 +32,7 @@ class SimulatedTime : public ::testing::Test {
     return std::move(*clock);
   }
   bool Lead(TimeLeader& leader, Duration time) {
-    return leader.Lead(time, Stamp() + std::chrono::hours(1) + time, {}, kTakenAll,
+    return leader.Lead(time, Stamp() + std::chrono::hours(1) + time, {}, kAllHasCome,
                        stop_.get_token());
   }
 
@@ -94,7 +96,7 @@ TEST_F(SimulatedTime, DoesNotWaitForAThreadWhoseSleepWasStopped) {
     EXPECT_TRUE(clock->SleepUntil(milliseconds(0), {}));
     EXPECT_FALSE(clock->SleepUntil(Duration::max(), stop_.get_token()));
   }).join();
-  EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, kTakenAll, {}));
+  EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, kAllHasCome, {}));
 }
 
 TEST_F(SimulatedTime, WaitsForAFollowerThatComesLater) {
@@ -109,62 +111,108 @@ TEST_F(SimulatedTime, WaitsForAFollowerThatComesLater) {
   EXPECT_TRUE(Eventually([&] { return moved.load(); }));
 }
 
-TEST_F(SimulatedTime, WaitsForCommandsOnTheirWay) {
+TEST_F(SimulatedTime, WaitsForSomeOnlyFromTheirTimeOn) {
+  const auto leader = MakeLeader({.in_step_with = {"suit@0.5"}});
+  ASSERT_TRUE(Lead(*leader, milliseconds(499)));
+  std::atomic<bool> moved{false};
+  const std::jthread leading([&] {
+    EXPECT_TRUE(Lead(*leader, milliseconds(500)));
+    moved = true;
+  });
+  const auto other = MakeClock("executor");
+  ASSERT_TRUE(
+      Eventually([&] { return other->Steady() == milliseconds(0) && other->WaitForLeader({}); }));
+  EXPECT_FALSE(moved);
+  const auto clock = MakeClock("suit");
+  EXPECT_TRUE(Eventually([&] { return moved.load(); }));
+}
+
+TEST_F(SimulatedTime, RefusesNamesWithoutSense) {
+  for (const char* entry : {"", "@1", "suit@", "suit@soon", "suit@-1"}) {
+    const auto leader = TimeLeader::Create(bus_, real_, "simulator", {.in_step_with = {entry}});
+    ASSERT_FALSE(leader.ok()) << entry;
+    EXPECT_EQ(leader.error().message,
+              "\"" + std::string(entry) + "\" is neither NAME nor NAME@SECONDS");
+  }
+}
+
+TEST_F(SimulatedTime, WaitsForWhatFollowersHaveSent) {
   const auto clock = MakeClock();
-  clock->SetCommandsSent([] { return std::uint64_t{3}; });
+  InStepBus in_step(bus_, bus_, nullptr, *clock);
+  const auto writer = *in_step.MakeWriter<JointCommandSample>("executor");
   const auto leader = MakeLeader({.in_step_with = {"executor"}});
-  std::atomic<std::uint64_t> taken{2};
+  ASSERT_TRUE(Lead(*leader, milliseconds(0)));
+  ASSERT_TRUE(writer->Write({}).ok());
+  std::atomic<bool> has_come{false};
   std::atomic<int> asked{0};
   std::atomic<bool> moved{false};
   const std::jthread leading([&] {
-    const auto count = [&](const std::string& program) {
-      EXPECT_EQ(program, "executor");
+    const auto asks = [&](const TopicCount& count) {
+      EXPECT_EQ(count.topic, "ircp/joint_command");
+      EXPECT_EQ(count.source, "executor");
+      EXPECT_EQ(count.sent, 1u);
       ++asked;
-      return taken.load();
+      return has_come.load();
     };
-    EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, count, {}));
+    EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, asks, {}));
     moved = true;
   });
   ASSERT_TRUE(Eventually([&] { return asked > 0; }));
   EXPECT_FALSE(moved);
-  taken = 3;
+  has_come = true;
   leader->Recheck();
   EXPECT_TRUE(Eventually([&] { return moved.load(); }));
 }
 
-TEST_F(SimulatedTime, ComesWhenWhatWasSentBeforeIsTakenIn) {
+TEST_F(SimulatedTime, DoesNotWaitForWhatWasSentBeforeItLed) {
+  const auto clock = MakeClock();
+  InStepBus in_step(bus_, bus_, nullptr, *clock);
+  const auto writer = *in_step.MakeWriter<JointCommandSample>("executor");
+  ASSERT_TRUE(writer->Write({}).ok());
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  const auto nothing = [](const TopicCount&) { return false; };
+  EXPECT_TRUE(leader->Lead(milliseconds(1), Stamp(), {}, nothing, {}));
+}
+
+TEST_F(SimulatedTime, IsAnsweredOnceTheProgramHasSettled) {
   const auto clock = MakeClock();
   const auto leader = MakeLeader({.in_step_with = {"executor"}});
-  ASSERT_TRUE(Lead(*leader, milliseconds(0)));
-  std::atomic<std::uint64_t> states{0};
+  std::atomic<bool> is_settled{false};
   std::atomic<int> asked{0};
-  clock->SetInputsTaken([&](const SentInputs& sent) {
-    EXPECT_EQ(sent.objects, 9u);
+  clock->SetSettled([&] {
     ++asked;
-    return states >= sent.joint_states;
+    return is_settled.load();
   });
   std::atomic<bool> reached{false};
   const std::jthread leading([&] {
-    EXPECT_TRUE(leader->Lead(milliseconds(8), Stamp(), {.joint_states = 2, .objects = 9}, kTakenAll,
-                             stop_.get_token()));
+    EXPECT_TRUE(Lead(*leader, milliseconds(8)));
     reached = true;
   });
   ASSERT_TRUE(Eventually([&] { return asked > 0; }));
-  states = 1;
   const int before = asked;
   clock->Recheck();
   ASSERT_TRUE(Eventually([&] { return asked > before; }));
-  EXPECT_EQ(clock->Steady(), Duration(0));
   EXPECT_FALSE(reached);
-  states = 2;
+  is_settled = true;
   clock->Recheck();
-  ASSERT_TRUE(Eventually([&] { return reached.load(); }));
-  EXPECT_EQ(clock->Steady(), milliseconds(8));
-  clock->SetInputsTaken(nullptr);
+  EXPECT_TRUE(Eventually([&] { return reached.load(); }));
+  clock->SetSettled(nullptr);
+}
+
+TEST_F(SimulatedTime, IsNotHeldUpByAProgramThatNeverSettles) {
+  const auto clock = MakeClock("executor", {.input_patience = milliseconds(1)});
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  clock->SetSettled([] { return false; });
+  ASSERT_TRUE(Lead(*leader, milliseconds(0)));
+  EXPECT_TRUE(Lead(*leader, milliseconds(1)));
+  EXPECT_EQ(clock->Steady(), milliseconds(1));
+  clock->SetSettled(nullptr);
 }
 
 TEST_F(SimulatedTime, WaitsForAProgramUntilItIsComplete) {
-  const auto clock = MakeClock("executor", {.answers_at_once = false});
+  const auto clock = MakeClock("executor", {.is_complete = false});
+  InStepBus in_step(bus_, bus_, nullptr, *clock);
+  const auto writer = *in_step.MakeWriter<SuitSample>("suit");
   const auto leader = MakeLeader({.in_step_with = {"executor"}});
   std::atomic<bool> reached{false};
   const std::jthread leading([&] {
@@ -173,19 +221,63 @@ TEST_F(SimulatedTime, WaitsForAProgramUntilItIsComplete) {
   });
   EXPECT_TRUE(clock->WaitForLeader({}));
   EXPECT_FALSE(reached);
-  clock->SetInputsTaken([](const SentInputs&) { return true; });
+  EXPECT_TRUE(clock->Begin(NetworkClock::Caller::kOnlyWaits));
   EXPECT_TRUE(Eventually([&] { return reached.load(); }));
-  clock->SetInputsTaken(nullptr);
 }
 
-TEST_F(SimulatedTime, IsNotHeldUpByASampleThatNeverComes) {
-  const auto clock = MakeClock("executor", {.input_patience = milliseconds(1)});
+TEST_F(SimulatedTime, BeginsAProgramsFirstMomentOnceItsThreadSleeps) {
+  const auto clock =
+      MakeClock("executor", {.patience = std::chrono::hours(1), .is_complete = false});
+  InStepBus in_step(bus_, bus_, nullptr, *clock);
+  const auto writer = *in_step.MakeWriter<SuitSample>("suit");
+  const auto leader = MakeLeader({.in_step_with = {"executor"}});
+  std::atomic<bool> reached{false};
+  const std::jthread leading([&] {
+    EXPECT_TRUE(Lead(*leader, milliseconds(0)));
+    reached = true;
+    EXPECT_TRUE(Lead(*leader, milliseconds(7)));
+  });
+  ASSERT_TRUE(clock->Begin(NetworkClock::Caller::kSleeps));
+  EXPECT_FALSE(reached);
+  EXPECT_TRUE(clock->SleepUntil(milliseconds(7), {}));
+  EXPECT_EQ(clock->Steady(), milliseconds(7));
+  EXPECT_TRUE(clock->SleepUntilWithin(milliseconds(7), std::chrono::seconds(20)));
+  EXPECT_FALSE(clock->SleepUntilWithin(milliseconds(8), milliseconds(1)));
+  EXPECT_FALSE(clock->SleepUntil(Duration::max(), [] {
+    std::stop_source left;
+    left.request_stop();
+    return left.get_token();
+  }()));
+}
+
+TEST_F(SimulatedTime, StandsStillWhileItIsHeld) {
+  const auto clock = MakeClock();
   const auto leader = MakeLeader({.in_step_with = {"executor"}});
   ASSERT_TRUE(Lead(*leader, milliseconds(0)));
-  clock->SetInputsTaken([](const SentInputs&) { return false; });
-  EXPECT_TRUE(Lead(*leader, milliseconds(1)));
-  EXPECT_EQ(clock->Steady(), milliseconds(1));
-  clock->SetInputsTaken(nullptr);
+  std::atomic<bool> reached{false};
+  std::jthread leading;
+  {
+    const TimeHold hold(*clock);
+    leading = std::jthread([&] {
+      EXPECT_TRUE(Lead(*leader, milliseconds(8)));
+      reached = true;
+    });
+    ASSERT_TRUE(Eventually([&] { return clock->Steady() == milliseconds(8); }));
+    EXPECT_FALSE(reached);
+  }
+  EXPECT_TRUE(Eventually([&] { return reached.load(); }));
+  EXPECT_NE(&RealTimeOf(*clock), clock.get());
+  EXPECT_EQ(&RealTimeOf(real_), &real_);
+}
+
+TEST_F(SimulatedTime, GoesOnAtOnceWithoutAFollowerThatHasLeft) {
+  const auto leader = MakeLeader({.in_step_with = {"executor"}, .patience = std::chrono::hours(1)});
+  {
+    const auto clock = MakeClock();
+    ASSERT_TRUE(Lead(*leader, milliseconds(1)));
+  }
+  EXPECT_TRUE(Lead(*leader, milliseconds(2)));
+  EXPECT_TRUE(leader->TakeLost().empty());
 }
 
 TEST_F(SimulatedTime, GoesOnWithoutAFollowerThatFellSilentAndNamesIt) {
@@ -194,11 +286,160 @@ TEST_F(SimulatedTime, GoesOnWithoutAFollowerThatFellSilentAndNamesIt) {
     const auto clock = MakeClock();
     ASSERT_TRUE(Lead(*leader, milliseconds(1)));
     EXPECT_TRUE(leader->TakeLost().empty());
+    bus_.LoseWhere([](const std::string& topic, const Header& header) {
+      return topic == ClockSample::kTopic && header.source == "executor";
+    });
   }
   ASSERT_TRUE(Lead(*leader, milliseconds(2)));
   EXPECT_EQ(leader->TakeLost(), std::vector<std::string>{"executor"});
   EXPECT_TRUE(Lead(*leader, milliseconds(3)));
   EXPECT_TRUE(leader->TakeLost().empty());
+}
+
+// ---- what one hears in step
+
+class InStepNetwork : public SimulatedTime {
+ protected:
+  /// A program in step.
+  struct Program {
+    std::unique_ptr<NetworkClock> clock;
+    std::unique_ptr<InStepBus> bus;
+  };
+  Program Make(const std::string& name) {
+    Program program;
+    program.clock = MakeClock(name);
+    program.bus = std::make_unique<InStepBus>(bus_, bus_, nullptr, *program.clock);
+    return program;
+  }
+};
+
+TEST_F(InStepNetwork, HandsSamplesOverAtTheNextMomentInAFixedOrder) {
+  const Program suit = Make("suit");
+  const Program touch = Make("touch");
+  const Program listener = Make("listener");
+  const auto leader = MakeLeader({.in_step_with = {"suit", "touch", "listener"}});
+  const auto joints = *suit.bus->MakeWriter<SuitSample>("suit");
+  const auto forces = *touch.bus->MakeWriter<TactileSample>("finger");
+  const auto states = *bus_.MakeWriter<JointStateSample>(kRobotSource);
+  std::vector<std::string> heard;
+  std::vector<Stamp> received;
+  const auto note = [&](const auto& sample, const Reception& from) {
+    heard.push_back(sample.header.source + std::to_string(sample.header.seq));
+    received.push_back(from.received);
+  };
+  const auto joint_reader = *listener.bus->MakeReader<SuitSample>(note);
+  const auto force_reader = *listener.bus->MakeReader<TactileSample>(note);
+  const auto state_reader = *listener.bus->MakeReader<JointStateSample>(note);
+  const auto lead = [&](int ms) {
+    const std::vector<TopicCount> sent = {{JointStateSample::kTopic, kRobotSource, states->sent()}};
+    return leader->Lead(milliseconds(ms), Stamp() + milliseconds(ms), sent, kAllHasCome, {});
+  };
+  ASSERT_TRUE(lead(0));
+  ASSERT_TRUE(lead(1));  // now everybody is known
+  ASSERT_TRUE(states->Write({}).ok());
+  ASSERT_TRUE(forces->Write({}).ok());
+  ASSERT_TRUE(forces->Write({}).ok());
+  ASSERT_TRUE(joints->Write({}).ok());
+  EXPECT_TRUE(heard.empty());
+  ASSERT_TRUE(lead(2));  // the leader had not heard yet what was sent after 1
+  EXPECT_EQ(heard, std::vector<std::string>({"robot1"}));
+  ASSERT_TRUE(lead(3));
+  EXPECT_EQ(heard, std::vector<std::string>({"robot1", "suit1", "finger1", "finger2"}));
+  EXPECT_EQ(received.front(), Stamp() + milliseconds(2));
+  EXPECT_EQ(received.back(), Stamp() + milliseconds(3));
+}
+
+TEST_F(InStepNetwork, SettlesAfterEachSampleBeforeAnybodyActs) {
+  const Program program = Make("program");
+  const auto leader = MakeLeader({.in_step_with = {"program"}});
+  const auto states = *bus_.MakeWriter<JointStateSample>(kRobotSource);
+  std::atomic<int> taken{0};
+  std::atomic<int> checked{0};
+  const auto reader =
+      *program.bus->MakeReader<JointStateSample>([&](const JointStateSample&, const Reception&) {
+        EXPECT_EQ(taken, checked);
+        ++taken;
+      });
+  program.clock->SetSettled([&] {
+    checked = taken.load();
+    return true;
+  });
+  const auto lead = [&](int ms) {
+    return leader->Lead(milliseconds(ms), Stamp(),
+                        {{JointStateSample::kTopic, kRobotSource, states->sent()}}, kAllHasCome,
+                        {});
+  };
+  ASSERT_TRUE(lead(0));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(states->Write({}).ok());
+  ASSERT_TRUE(lead(1));
+  EXPECT_EQ(taken, 3);
+  program.clock->SetSettled(nullptr);
+}
+
+TEST_F(InStepNetwork, PassesOnAtOnceWhatOutsidersSend) {
+  const Program program = Make("program");
+  int heard = 0;
+  const auto reader = *program.bus->MakeReader<SafetySample>(
+      [&](const SafetySample&, const Reception&) { ++heard; });
+  const auto stop_button = *bus_.MakeWriter<SafetySample>("button");
+  ASSERT_TRUE(stop_button->Write({}).ok());
+  EXPECT_EQ(heard, 1);
+}
+
+TEST_F(InStepNetwork, IsNotHeldUpByASampleThatNeverComes) {
+  Program program;
+  program.clock = MakeClock("program", {.input_patience = milliseconds(1)});
+  program.bus = std::make_unique<InStepBus>(bus_, bus_, nullptr, *program.clock);
+  const auto leader = MakeLeader({.in_step_with = {"program"}});
+  const auto states = *bus_.MakeWriter<JointStateSample>(kRobotSource);
+  const auto reader =
+      *program.bus->MakeReader<JointStateSample>([](const JointStateSample&, const Reception&) {});
+  const auto lead = [&](int ms, std::uint64_t sent) {
+    return leader->Lead(milliseconds(ms), Stamp(), {{JointStateSample::kTopic, kRobotSource, sent}},
+                        kAllHasCome, {});
+  };
+  ASSERT_TRUE(lead(0, 0));
+  EXPECT_TRUE(lead(1, 5));
+  EXPECT_EQ(program.clock->Steady(), milliseconds(1));
+}
+
+TEST_F(InStepNetwork, AcknowledgesOnceReadersInStepHaveTheSamples) {
+  Program program;
+  program.clock = MakeClock("program", {.patience = milliseconds(1)});
+  program.bus = std::make_unique<InStepBus>(bus_, bus_, nullptr, *program.clock);
+  const auto leader = MakeLeader({.in_step_with = {"program"}});
+  const auto writer = *program.bus->MakeWriter<SuitSample>("suit");
+  ASSERT_TRUE(Lead(*leader, milliseconds(0)));
+  EXPECT_TRUE(writer->WaitForAcknowledgments(milliseconds(1)));  // nothing was sent
+  ASSERT_TRUE(writer->Write({}).ok());
+  EXPECT_FALSE(writer->WaitForAcknowledgments(milliseconds(1)));
+  ASSERT_TRUE(Lead(*leader, milliseconds(8)));
+  EXPECT_TRUE(writer->WaitForAcknowledgments(milliseconds(1)));
+}
+
+TEST_F(InStepNetwork, ACallTakesNoTimeAndIsHeardAtTheTimeItWasMade) {
+  const Program asker = Make("asker");
+  const Program recorder = Make("recorder");
+  const auto leader = MakeLeader({.in_step_with = {"asker", "recorder"}});
+  std::atomic<std::int64_t> asked_at{-1};
+  const auto server = *ControlServer::Create(*recorder.bus, *recorder.clock, "recorder",
+                                             [&](const CommandSample&) -> Answer {
+                                               asked_at = recorder.clock->Steady().count();
+                                               return {true, "started", {}};
+                                             });
+  const auto client = *ControlClient::Create(*asker.bus, *asker.clock, "recorder", "asker", 1);
+  std::atomic<std::int64_t> answered_at{-1};
+  std::jthread caller([&](const std::stop_token& stop) {
+    ASSERT_TRUE(asker.clock->SleepUntil(milliseconds(8), stop));
+    const auto answer = client->Call("start", {}, std::chrono::seconds(20), stop);
+    EXPECT_TRUE(answer.ok());
+    answered_at = asker.clock->Steady().count();
+    EXPECT_FALSE(asker.clock->SleepUntil(Duration::max(), stop));
+  });
+  ASSERT_TRUE(Eventually([&] { return asker.clock->asleep() == 1; }));
+  for (int ms = 0; ms <= 24; ms += 4) ASSERT_TRUE(Lead(*leader, milliseconds(ms)));
+  EXPECT_EQ(Duration(asked_at.load()), milliseconds(8));
+  EXPECT_EQ(Duration(answered_at.load()), milliseconds(8));
 }
 
 TEST_F(SimulatedTime, NeverGoesBackWhenAnotherLeaderBegins) {

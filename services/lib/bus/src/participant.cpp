@@ -30,8 +30,12 @@ const TopicQos& QosOf() {
 template <class Sample>
 class SampleWriter final : public ircp::Writer<Sample> {
  public:
-  SampleWriter(std::unique_ptr<ByteWriter> writer, std::string source, const Clock& clock)
-      : writer_(std::move(writer)), source_(std::move(source)), clock_(clock) {}
+  SampleWriter(std::unique_ptr<ByteWriter> writer, std::string source, const Clock& clock,
+               bool stamps_all)
+      : writer_(std::move(writer)),
+        source_(std::move(source)),
+        clock_(clock),
+        stamps_all_(stamps_all) {}
 
   Status Write(Sample sample) override {
     sample.header.source = source_;
@@ -42,6 +46,7 @@ class SampleWriter final : public ircp::Writer<Sample> {
     const std::lock_guard lock(mutex_);
     sample.header.seq = sent_ + 1;
     Bytes bytes{.cdr = Encode(sample), .key = KeyHashOf(sample)};
+    if (stamps_all_) bytes.source_stamp = clock_.Now();
     Status written = writer_->Write(bytes);
     if (written.ok()) ++sent_;
     return written;
@@ -60,6 +65,7 @@ class SampleWriter final : public ircp::Writer<Sample> {
   std::unique_ptr<ByteWriter> writer_;
   const std::string source_;
   const Clock& clock_;
+  const bool stamps_all_;
   mutable std::mutex mutex_;  ///< numbers go out in order
   std::uint64_t sent_ = 0;
 };
@@ -123,8 +129,8 @@ class DdsParticipant final : public ircp::BusOf<DdsParticipant, Participant> {
     Result<std::unique_ptr<ByteWriter>> writer =
         station_->MakeWriter(topic, TypeInfoOf<Sample>(), QosFor<Sample>(topic));
     if (!writer.ok()) return writer.error();
-    return std::unique_ptr<ircp::Writer<Sample>>(
-        std::make_unique<SampleWriter<Sample>>(std::move(*writer), source, *options_.clock));
+    return std::unique_ptr<ircp::Writer<Sample>>(std::make_unique<SampleWriter<Sample>>(
+        std::move(*writer), source, *options_.clock, options_.stamps_all));
   }
 
   template <class Sample>

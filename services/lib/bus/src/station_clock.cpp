@@ -4,38 +4,59 @@
 
 namespace exemplar::bus {
 
-Result<StationClock> StationClock::Follow(ParticipantOptions options, const std::string& name,
-                                          std::stop_token stop) {
+Result<StationClock> StationClock::Create(const std::string& kind, ParticipantOptions& network,
+                                          const std::string& name, std::stop_token stop) {
   StationClock clock;
-  options.clock = nullptr;
-  options.name += " clock";
-  auto participant = Participant::Create(std::move(options));
-  if (!participant.ok()) return participant.error();
-  clock.participant_ = std::move(*participant);
-  auto network = ircp::NetworkClock::Create(*clock.participant_, name, {.answers_at_once = false});
-  if (!network.ok()) return network.error();
-  clock.network_ = std::move(*network);
-  if (!clock.network_->WaitForLeader(std::move(stop))) {
-    return Error{ErrorCode::kCancelled, "no simulated time was heard on ircp/clock", "clock"};
+  clock.name_ = name;
+  clock.system_ = std::make_unique<SystemClock>();
+  if (kind == "network") {
+    ParticipantOptions own = network;
+    own.clock = nullptr;
+    own.name += " clock";
+    own.shared_memory_bytes = 0;
+    auto participant = Participant::Create(std::move(own));
+    if (!participant.ok()) return participant.error();
+    clock.participant_ = std::move(*participant);
+    auto followed = ircp::NetworkClock::Create(*clock.participant_, name, {.is_complete = false});
+    if (!followed.ok()) return followed.error();
+    clock.network_ = std::move(*followed);
+    if (!clock.network_->WaitForLeader(std::move(stop))) {
+      return Error{ErrorCode::kCancelled, "no simulated time was heard on ircp/clock", "clock"};
+    }
   }
+  network.clock = &*clock;
+  network.stamps_all = clock.is_simulated();
   return clock;
 }
 
 const Clock& StationClock::operator*() const {
   if (network_) return *network_;
-  return system_;
+  return *system_;
 }
 
-void StationClock::SetCommandsSent(std::function<std::uint64_t()> commands_sent) {
-  if (network_) network_->SetCommandsSent(std::move(commands_sent));
+ircp::Bus& StationClock::bus(Participant& participant) {
+  if (!network_) return participant;
+  bus_ = std::make_unique<ircp::InStepBus>(participant, *participant_, &participant, *network_);
+  return *bus_;
 }
 
-void StationClock::SetInputsTaken(std::function<bool(const ircp::SentInputs&)> inputs_taken) {
-  if (network_) network_->SetInputsTaken(std::move(inputs_taken));
+ircp::RawBus& StationClock::raw_bus(Participant& participant) {
+  if (!network_) return participant;
+  return *bus_;
+}
+
+void StationClock::SetSettled(std::function<bool()> is_settled) {
+  if (network_) network_->SetSettled(std::move(is_settled));
 }
 
 void StationClock::Recheck() {
   if (network_) network_->Recheck();
+}
+
+void StationClock::Begin(ircp::NetworkClock::Caller caller, Log& log, std::stop_token stop) {
+  if (!network_ || network_->Begin(caller, std::move(stop))) return;
+  log.Warning("the simulated time does not wait for this program",
+              {{"advice", "name \"" + name_ + "\" in the simulator's --in-step-with"}});
 }
 
 }  // namespace exemplar::bus

@@ -6,6 +6,7 @@
 
 #include "exemplar/base/ids.hpp"
 #include "exemplar/ircp/control.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::ircp {
 namespace {
@@ -23,7 +24,10 @@ std::uint64_t SeedOfIds(std::uint64_t seed, const Clock& clock) {
 class Client final : public ControlClient {
  public:
   Client(const Clock& clock, std::string program, std::uint64_t seed)
-      : clock_(clock), program_(std::move(program)), rng_(SeedOfIds(seed, clock)) {}
+      : clock_(clock),
+        real_(RealTimeOf(clock)),
+        program_(std::move(program)),
+        rng_(SeedOfIds(seed, clock)) {}
 
   ~Client() override { reader_.reset(); }
 
@@ -52,7 +56,8 @@ class Client final : public ControlClient {
       command.request_id = MakeId("request", rng_);
       pending_[command.request_id] = &pending;
     }
-    const Result<Answer> answer = Ask(command, pending, clock_.Steady() + timeout, stop);
+    const TimeHold hold(clock_);  // a call takes no simulated time
+    const Result<Answer> answer = Ask(command, pending, real_.Steady() + timeout, stop);
     const std::lock_guard lock(mutex_);
     pending_.erase(command.request_id);
     return answer;
@@ -73,11 +78,11 @@ class Client final : public ControlClient {
                      const std::stop_token& stop) {
     // Commands are volatile: what nobody reads yet is gone.
     while (writer_->matched_readers() == 0) {
-      if (clock_.Steady() >= deadline) {
+      if (real_.Steady() >= deadline) {
         return Unavailable("nobody listens on " + CommandTopic(program_) + ": is " + program_ +
                            " running in this station?");
       }
-      if (!clock_.SleepUntil(std::min(deadline, clock_.Steady() + kMatchPeriod), stop)) {
+      if (!real_.SleepUntil(std::min(deadline, real_.Steady() + kMatchPeriod), stop)) {
         return Cancelled(command);
       }
     }
@@ -89,11 +94,11 @@ class Client final : public ControlClient {
     while (true) {
       if (!hurried && stop.stop_requested()) {
         hurried = true;
-        deadline = std::min(deadline, clock_.Steady() + kLastPatience);
+        deadline = std::min(deadline, real_.Steady() + kLastPatience);
       }
       if (Status sent = writer_->Write(command); !sent) return sent.error();
-      const Duration next = std::min(deadline, clock_.Steady() + kRepeatPeriod);
-      clock_.SleepUntil(next, hurried ? pending.answered.get_token() : wake.get_token());
+      const Duration next = std::min(deadline, real_.Steady() + kRepeatPeriod);
+      real_.SleepUntil(next, hurried ? pending.answered.get_token() : wake.get_token());
       {
         const std::lock_guard lock(mutex_);
         if (pending.answer) {
@@ -101,7 +106,7 @@ class Client final : public ControlClient {
           return FailedPrecondition(pending.answer->detail);
         }
       }
-      if (clock_.Steady() >= deadline) {
+      if (real_.Steady() >= deadline) {
         if (stop.stop_requested()) return Cancelled(command);
         return Unavailable(program_ + " did not answer \"" + command.action + "\" on " +
                            StatusTopic(program_) + " in time");
@@ -120,6 +125,7 @@ class Client final : public ControlClient {
   }
 
   const Clock& clock_;
+  const Clock& real_;  ///< for what the network takes
   const std::string program_;
   std::mutex mutex_;
   Rng rng_;

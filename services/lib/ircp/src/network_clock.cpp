@@ -6,12 +6,16 @@
 #include <utility>
 
 #include "exemplar/ircp/simulated_time.hpp"
+#include "sent_counts.hpp"
+#include "step_mail.hpp"
 
 namespace exemplar::ircp {
 namespace {
 
 using RealTime = std::chrono::steady_clock;
 constexpr std::size_t kThreadsExpected = 32;
+/// The leader says its time again and again, so it hears of a new program at once.
+constexpr Duration kLeaderPatience = std::chrono::seconds(2);
 
 /// A thread that has slept by this clock.
 struct Sleeper {
@@ -22,15 +26,24 @@ struct Sleeper {
   RealTime::time_point woken = {};
 };
 
+/// What the leader said.
+struct Saying {
+  Duration time{0};
+  Stamp stamp;
+  std::vector<TopicCount> sent;
+};
+
 class Follower final : public NetworkClock {
  public:
-  explicit Follower(const NetworkClockOptions& options) : options_(options) {
+  explicit Follower(const NetworkClockOptions& options)
+      : options_(options), is_complete_(options.is_complete) {
     sleepers_.reserve(kThreadsExpected);
   }
 
   ~Follower() override {
     reader_.reset();
     replier_ = {};
+    if (writer_ && has_time_) Answer("left", told_.time);
   }
 
   Status Start(Bus& bus, const std::string& program) {
@@ -58,31 +71,17 @@ class Follower final : public NetworkClock {
   }
 
   bool SleepUntil(Duration steady, std::stop_token stop) const override {
-    std::unique_lock lock(mutex_);
-    const std::size_t me = IndexOfThisThread();
-    if (!stop.stop_requested() && steady > steady_) {
-      sleepers_[me].deadline = steady;
-      sleepers_[me].state = Sleeper::State::kAsleep;
-      settled_.notify_all();
-      moved_.wait(lock, stop, [&] { return steady_ >= steady; });
-    }
-    const bool reached = steady_ >= steady && !stop.stop_requested();
-    sleepers_[me].state = reached ? Sleeper::State::kAwake : Sleeper::State::kElsewhere;
-    sleepers_[me].woken = RealTime::now();
-    if (!reached) settled_.notify_all();
-    return reached;
+    return Sleep(steady, stop, std::nullopt);
   }
 
-  void SetCommandsSent(std::function<std::uint64_t()> commands_sent) override {
-    const std::lock_guard lock(asking_mutex_);
-    commands_sent_ = std::move(commands_sent);
+  bool SleepUntilWithin(Duration steady, Duration limit) const override {
+    return Sleep(steady, {}, RealTime::now() + limit);
   }
 
-  void SetInputsTaken(std::function<bool(const SentInputs&)> inputs_taken) override {
+  void SetSettled(std::function<bool()> is_settled) override {
     {
       const std::lock_guard lock(asking_mutex_);
-      inputs_taken_ = std::move(inputs_taken);
-      is_complete_ = true;
+      is_settled_ = std::move(is_settled);
     }
     Recheck();
   }
@@ -93,6 +92,24 @@ class Follower final : public NetworkClock {
       ++rechecks_;
     }
     settled_.notify_all();
+  }
+
+  bool Begin(Caller caller, std::stop_token stop) override {
+    std::unique_lock lock(mutex_);
+    is_awaited_ = false;
+    is_asked_ = is_asked_ || has_time_;  // says what the program sends
+    settled_.notify_all();
+    const bool is_awaited =
+        moved_.wait_for(lock, stop, kLeaderPatience, [this] { return is_awaited_; });
+    if (caller == Caller::kSleeps) {
+      const std::size_t me = IndexOfThisThread();
+      sleepers_[me].state = Sleeper::State::kAwake;
+      sleepers_[me].woken = RealTime::now();
+    }
+    is_complete_ = true;
+    is_asked_ = has_time_;
+    settled_.notify_all();
+    return is_awaited;
   }
 
   int asleep() const override {
@@ -107,6 +124,21 @@ class Follower final : public NetworkClock {
     return moved_.wait(lock, stop, [this] { return has_time_; });
   }
 
+  void Hold() const override {
+    const std::lock_guard lock(mutex_);
+    ++holds_;
+  }
+
+  void Release() const override {
+    {
+      const std::lock_guard lock(mutex_);
+      --holds_;
+    }
+    settled_.notify_all();
+  }
+
+  StepMail& mail() override { return mail_; }
+
  private:
   std::size_t IndexOfThisThread() const {
     const std::thread::id me = std::this_thread::get_id();
@@ -116,20 +148,47 @@ class Follower final : public NetworkClock {
     return static_cast<std::size_t>(it - sleepers_.begin());
   }
 
+  bool Sleep(Duration steady, const std::stop_token& stop,
+             std::optional<RealTime::time_point> limit) const {
+    std::unique_lock lock(mutex_);
+    const std::size_t me = IndexOfThisThread();
+    const auto is_over = [&] { return begun_ >= steady; };
+    if (!stop.stop_requested() && !is_over()) {
+      sleepers_[me].deadline = steady;
+      sleepers_[me].state = Sleeper::State::kAsleep;
+      settled_.notify_all();
+      if (limit) {
+        moved_.wait_until(lock, stop, *limit, is_over);
+      } else {
+        moved_.wait(lock, stop, is_over);
+      }
+    }
+    const bool reached = is_over() && !stop.stop_requested();
+    sleepers_[me].state = reached || limit ? Sleeper::State::kAwake : Sleeper::State::kElsewhere;
+    sleepers_[me].woken = RealTime::now();
+    if (!reached) settled_.notify_all();
+    return reached;
+  }
+
   /// On a thread of the network: only hands over.
   void Take(const ClockSample& sample, const Reception& from) {
     if (sample.second.nanoseconds() < 0 || sample.third.nanoseconds() < 0) return;
+    Saying saying{Duration(sample.first.nanoseconds()), sample.header.stamp,
+                  CountsFromText(sample.peer)};
+    if (sample.peer.empty()) {
+      saying.sent = {{JointStateSample::kTopic, kRobotSource,
+                      static_cast<std::uint64_t>(sample.second.nanoseconds())},
+                     {ObjectSample::kTopic, kTrackerSource,
+                      static_cast<std::uint64_t>(sample.third.nanoseconds())}};
+    }
     {
       const std::lock_guard lock(mutex_);
       if (leader_ != from.writer) {
         leader_ = from.writer;
-        leader_name_ = sample.header.source;
-        offset_ = steady_ - Duration(sample.first.nanoseconds());
+        offset_ = steady_ - saying.time;
       }
-      told_ = Duration(sample.first.nanoseconds());
-      told_stamp_ = sample.header.stamp;
-      told_sent_ = {static_cast<std::uint64_t>(sample.second.nanoseconds()),
-                    static_cast<std::uint64_t>(sample.third.nanoseconds())};
+      // What was sent until the moment begins counts, and not what was said of it later.
+      if (!is_asked_ || saying.time != told_.time) told_ = std::move(saying);
       is_asked_ = true;
       ++rechecks_;
     }
@@ -140,69 +199,156 @@ class Follower final : public NetworkClock {
     std::unique_lock lock(mutex_);
     while (settled_.wait(lock, stop, [this] { return is_asked_; })) {
       is_asked_ = false;
-      const Duration told = told_;
-      const Stamp stamp = told_stamp_;
-      if (!WaitForInputs(lock, told_sent_, stop)) return;
-      if (told != told_) continue;  // another leader, meanwhile
-      MoveOn(told, stamp);
-      if (!WaitForSleepers(lock, stop)) return;
-      ClockSample reply;
-      reply.mode = "reached";
-      reply.peer = leader_name_;
-      reply.first = Stamp::FromNanoseconds(told.count());
+      const Saying told = told_;
+      const bool is_complete = is_complete_;
       lock.unlock();
-      bool answers = options_.answers_at_once;
-      {
-        const std::lock_guard asking(asking_mutex_);
-        answers = answers || is_complete_;
-        const std::uint64_t sent = commands_sent_ ? commands_sent_() : 0;
-        reply.third = Stamp::FromNanoseconds(static_cast<std::int64_t>(sent));
+      mail_.Learn(told.sent);
+      const bool is_awaited = IsAwaited(told.sent);
+      lock.lock();
+      if (is_awaited != is_awaited_) {
+        is_awaited_ = is_awaited;
+        moved_.notify_all();
       }
+      const bool goes_on = told.time + offset_ > steady_ || !has_time_;
+      if (goes_on && is_complete && !WaitForMail(lock, told.sent, stop)) return;
+      if (told.time != told_.time) continue;  // another leader, meanwhile
+      if (goes_on) {
+        SetTime(told);
+        if (!HandOver(lock, told, stop)) return;
+      } else if (told.time + offset_ == steady_) {
+        now_ = told.stamp;
+        has_time_ = true;
+      }
+      MoveOn(lock);
+      if (!is_complete) {
+        lock.unlock();
+        Answer("here", told.time);
+        lock.lock();
+        continue;
+      }
+      if (!WaitUntilSettled(lock, stop, true)) return;
+      lock.unlock();
       // The leader asks again, for one that is lost as well.
-      if (answers) (void)writer_->Write(std::move(reply));
+      Answer("reached", told.time);
       lock.lock();
     }
   }
 
-  /// Mutex held.
-  void MoveOn(Duration told, Stamp stamp) {
-    if (told + offset_ >= steady_) {
-      steady_ = told + offset_;
-      now_ = stamp;
+  void Answer(const char* mode, Duration time) {
+    ClockSample reply;
+    reply.mode = mode;
+    reply.first = Stamp::FromNanoseconds(time.count());
+    const std::vector<TopicCount> sent = mail_.Sent();
+    std::uint64_t commands = 0;
+    for (const TopicCount& count : sent) {
+      if (count.topic == JointCommandSample::kTopic) commands += count.sent;
     }
+    reply.third = Stamp::FromNanoseconds(static_cast<std::int64_t>(commands));
+    reply.peer = CountsToText(sent);
+    (void)writer_->Write(std::move(reply));
+  }
+
+  /// Whether the leader knows of all that this program sends.
+  bool IsAwaited(const std::vector<TopicCount>& counts) const {
+    const std::vector<TopicCount> own = mail_.Sent();
+    return !own.empty() && std::all_of(own.begin(), own.end(), [&](const TopicCount& mine) {
+      return std::any_of(counts.begin(), counts.end(), [&](const TopicCount& count) {
+        return count.topic == mine.topic && count.source == mine.source;
+      });
+    });
+  }
+
+  /// Mutex held.
+  void SetTime(const Saying& told) {
+    steady_ = std::max(steady_, told.time + offset_);
+    now_ = told.stamp;
     has_time_ = true;
+  }
+
+  /// The moment has begun: wakes who has slept until then. Mutex held.
+  void MoveOn(std::unique_lock<std::mutex>& lock) {
+    begun_ = steady_;
     for (Sleeper& sleeper : sleepers_) {
-      if (sleeper.state != Sleeper::State::kAsleep || sleeper.deadline > steady_) continue;
+      if (sleeper.state != Sleeper::State::kAsleep || sleeper.deadline > begun_) continue;
       sleeper.state = Sleeper::State::kAwake;
       sleeper.woken = RealTime::now();
     }
     moved_.notify_all();
+    const Stamp now = now_;
+    lock.unlock();
+    mail_.Open(now);
+    lock.lock();
   }
 
-  bool WaitForInputs(std::unique_lock<std::mutex>& lock, SentInputs sent,
-                     const std::stop_token& stop) {
+  bool WaitForMail(std::unique_lock<std::mutex>& lock, const std::vector<TopicCount>& sent,
+                   const std::stop_token& stop) {
     const RealTime::time_point patient = RealTime::now() + options_.input_patience;
     while (!stop.stop_requested()) {
       const std::uint64_t asked = rechecks_;
       lock.unlock();
-      bool taken = true;
-      {
-        const std::lock_guard asking(asking_mutex_);
-        if (inputs_taken_) taken = inputs_taken_(sent);
-      }
+      const bool has_come = mail_.HasCome(sent);
+      const bool is_late = !has_come && RealTime::now() >= patient;
+      if (is_late) mail_.GiveUp(sent);
       lock.lock();
-      if (taken || RealTime::now() >= patient) return true;
+      if (has_come || is_late) return true;
       settled_.wait_until(lock, stop, patient, [&] { return rechecks_ != asked; });
     }
     return false;
   }
 
-  bool WaitForSleepers(std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
+  /// What was sent before is taken in before anybody acts.
+  bool HandOver(std::unique_lock<std::mutex>& lock, const Saying& told,
+                const std::stop_token& stop) {
+    lock.unlock();
+    mail_.Close();
+    mail_.DeliverUpTo(told.sent, [&] {
+      std::unique_lock own(mutex_);
+      (void)WaitUntilSettled(own, stop, false);
+    });
+    lock.lock();
+    return WaitUntilSettled(lock, stop, false);
+  }
+
+  /// Until the program has done what follows from what it was given, and, `with_sleepers`, until
+  /// everybody sleeps again and nobody holds the time. False: `stop` came first.
+  bool WaitUntilSettled(std::unique_lock<std::mutex>& lock, const std::stop_token& stop,
+                        bool with_sleepers) {
+    const RealTime::time_point patient = RealTime::now() + options_.input_patience;
     while (!stop.stop_requested()) {
+      if (with_sleepers && !WaitForSleepers(lock, stop)) return false;
+      const std::uint64_t asked = rechecks_;
+      lock.unlock();
+      bool is_settled = true;
+      {
+        const std::lock_guard asking(asking_mutex_);
+        if (is_settled_) is_settled = is_settled_();
+      }
+      lock.lock();
+      if (!is_settled && RealTime::now() < patient) {
+        settled_.wait_until(lock, stop, patient, [&] { return rechecks_ != asked; });
+      } else if (!with_sleepers || IsQuiet()) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  bool IsQuiet() const {
+    return holds_ == 0 &&
+           std::none_of(sleepers_.begin(), sleepers_.end(), [](const Sleeper& sleeper) {
+             return sleeper.state == Sleeper::State::kAwake;
+           });
+  }
+
+  bool WaitForSleepers(std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
+    while (!stop.stop_requested() && !IsQuiet()) {
+      const bool was_held = holds_ > 0;
+      if (was_held) settled_.wait(lock, stop, [this] { return holds_ == 0; });
       const RealTime::time_point now = RealTime::now();
       RealTime::time_point until = RealTime::time_point::max();
       for (Sleeper& sleeper : sleepers_) {
         if (sleeper.state != Sleeper::State::kAwake) continue;
+        if (was_held) sleeper.woken = now;  // it may have waited for something else
         const RealTime::time_point patient = sleeper.woken + options_.patience;
         if (patient <= now) {
           sleeper.state = Sleeper::State::kElsewhere;
@@ -210,14 +356,10 @@ class Follower final : public NetworkClock {
           until = std::min(until, patient);
         }
       }
-      if (until == RealTime::time_point::max()) return true;
-      settled_.wait_until(lock, stop, until, [this] {
-        return std::none_of(sleepers_.begin(), sleepers_.end(), [](const Sleeper& sleeper) {
-          return sleeper.state == Sleeper::State::kAwake;
-        });
-      });
+      if (until == RealTime::time_point::max()) continue;
+      settled_.wait_until(lock, stop, until, [this] { return holds_ > 0 || IsQuiet(); });
     }
-    return false;
+    return !stop.stop_requested();
   }
 
   const NetworkClockOptions options_;
@@ -225,21 +367,21 @@ class Follower final : public NetworkClock {
   mutable std::condition_variable_any moved_;    ///< time went on
   mutable std::condition_variable_any settled_;  ///< a thread sleeps again, or the leader asks
   mutable std::vector<Sleeper> sleepers_;        ///< one a thread that ever slept
-  std::string leader_;                           ///< its writer; empty: none was heard yet
-  std::string leader_name_;
+  mutable int holds_ = 0;
+  std::string leader_;  ///< its writer; empty: none was heard yet
   Duration offset_{0};  ///< steady time minus the leader's
   Duration steady_{0};
+  Duration begun_{0};  ///< as steady_, once what was sent before has been handed over
   Stamp now_;
   bool has_time_ = false;
-  Duration told_{0};  ///< what the leader said last
-  Stamp told_stamp_;
-  SentInputs told_sent_;
+  Saying told_;  ///< what the leader said last
   bool is_asked_ = false;
+  bool is_complete_ = false;
+  bool is_awaited_ = false;  ///< the leader waits for this program
   std::uint64_t rechecks_ = 0;
   std::mutex asking_mutex_;  ///< nobody is asked who has been forgotten
-  std::function<std::uint64_t()> commands_sent_;
-  std::function<bool(const SentInputs&)> inputs_taken_;
-  bool is_complete_ = false;  ///< SetInputsTaken was called
+  std::function<bool()> is_settled_;
+  StepMail mail_;
   std::unique_ptr<Writer<ClockSample>> writer_;
   std::jthread replier_;
   std::unique_ptr<Reader> reader_;
@@ -252,6 +394,24 @@ Result<std::unique_ptr<NetworkClock>> NetworkClock::Create(Bus& bus, const std::
   auto follower = std::make_unique<Follower>(options);
   if (Status started = follower->Start(bus, program); !started.ok()) return started.error();
   return std::unique_ptr<NetworkClock>(std::move(follower));
+}
+
+const Clock& RealTimeOf(const Clock& clock) {
+  static const SystemClock machine;
+  return dynamic_cast<const NetworkClock*>(&clock) != nullptr ? machine : clock;
+}
+
+TimeHold::TimeHold(const Clock& clock) : clock_(dynamic_cast<const NetworkClock*>(&clock)) {
+  if (clock_ != nullptr) clock_->Hold();
+}
+
+TimeHold::~TimeHold() {
+  if (clock_ != nullptr) clock_->Release();
+}
+
+Stamp LeaderClock::Now() const {
+  const std::int64_t now_ns = now_ns_.load();
+  return now_ns == kNotSet ? real_.Now() : Stamp::FromNanoseconds(now_ns);
 }
 
 }  // namespace exemplar::ircp
