@@ -30,14 +30,16 @@ foxglove::Permit PermitOf(std::shared_ptr<security::AccessFile> access) {
 
 class Side final : public FoxgloveSide {
  public:
-  Side(TopicHub& hub, api::JsonCalls& calls, http::Server& server, const Clock& clock, Log& log,
-       foxglove::Permit permit)
+  Side(TopicHub& hub, api::JsonCalls& calls, http::Server& server, const Clock& clock,
+       bool is_simulated, Log& log, foxglove::Permit permit)
       : server_(server),
         permit_(std::move(permit)),
-        bridge_(foxglove::Bridge::Create(hub, clock, log, foxglove::StationServices(calls),
-                                         {.name = "exemplar",
-                                          .session = std::to_string(clock.Now().nanoseconds()),
-                                          .permit = permit_})) {}
+        bridge_(
+            foxglove::Bridge::Create(hub, clock, log, foxglove::StationServices(calls),
+                                     {.name = "exemplar",
+                                      .session = std::to_string(real_clock_.Now().nanoseconds()),
+                                      .simulated_time = is_simulated,
+                                      .permit = permit_})) {}
 
   ~Side() override { server_.Stop(); }
 
@@ -58,14 +60,15 @@ class Side final : public FoxgloveSide {
       if (Status added = server_.RouteWebSocket(path, bridge_->Endpoint()); !added) return added;
     }
     if (words.recordings.empty()) return {};
-    playback_ =
-        foxglove::Playback::Create(clock, log, {.folder = words.recordings, .permit = permit_});
+    playback_ = foxglove::Playback::Create(real_clock_, log,
+                                           {.folder = words.recordings, .permit = permit_});
     return server_.RouteWebSocket("/foxglove/recordings/{file}", playback_->Endpoint());
   }
 
   std::vector<Metric> metrics() const override { return foxglove::MetricsOf(*bridge_); }
 
  private:
+  const SystemClock real_clock_;
   http::Server& server_;
   const foxglove::Permit permit_;
   std::optional<kinematics::RobotDescription> robot_;
@@ -80,14 +83,16 @@ Result<std::unique_ptr<FoxgloveSide>> FoxgloveSide::Create(const ProgramOptions&
                                                            const program::CommonOptions& common,
                                                            TopicHub& hub, api::JsonCalls& calls,
                                                            http::Server& server, const Clock& clock,
-                                                           Log& log) {
+                                                           bool is_simulated, Log& log) {
   std::shared_ptr<security::AccessFile> access;
   if (!common.server.access.empty()) {
-    auto opened = security::AccessFile::Open(common.server.access, clock, log);
+    static const SystemClock real_clock;
+    auto opened = security::AccessFile::Open(common.server.access, real_clock, log);
     if (!opened) return opened.error();
     access = std::move(*opened);
   }
-  auto side = std::make_unique<Side>(hub, calls, server, clock, log, PermitOf(std::move(access)));
+  auto side = std::make_unique<Side>(hub, calls, server, clock, is_simulated, log,
+                                     PermitOf(std::move(access)));
   if (Status started = side->Start(words, hub, clock, log); !started) return started.error();
   return std::unique_ptr<FoxgloveSide>(std::move(side));
 }

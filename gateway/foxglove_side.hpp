@@ -17,12 +17,12 @@ namespace exemplar::gateway {
 class FoxgloveSide {
  public:
   /// Adds its endpoints; before the server's start. All arguments outlive it; its destructor stops
-  /// the server.
+  /// the server. Clients are told the time of `clock` where it `is_simulated`.
   static Result<std::unique_ptr<FoxgloveSide>> Create(const ProgramOptions& words,
                                                       const program::CommonOptions& common,
                                                       TopicHub& hub, api::JsonCalls& calls,
                                                       http::Server& server, const Clock& clock,
-                                                      Log& log);
+                                                      bool is_simulated, Log& log);
   virtual ~FoxgloveSide() = default;
   virtual std::vector<Metric> metrics() const = 0;
 };

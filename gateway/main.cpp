@@ -1,7 +1,9 @@
 // exemplar-gateway: one address for every service of the system, and the station's topics for
 // clients that do not speak DDS.
 
+#include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/bus/station_clock.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
@@ -24,7 +26,7 @@ int main(int argc, char** argv) {
       kName, "One address for every service of the system, and the station's topics",
       "exemplar-gateway --station lab --listen 127.0.0.1:50050 --learning 127.0.0.1:50051 "
       "--executor 127.0.0.1:50052 --recorder 127.0.0.1:50053 --http 127.0.0.1:8080",
-      {.bus = true, .server = true, .client = true});
+      {.bus = true, .server = true, .clock = true, .client = true});
   gateway::ProgramOptions words;
   words.AddTo(options);
   if (const std::optional<int> code = options.Parse(argc, argv)) return *code;
@@ -32,22 +34,26 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(common, "gateway");
-  const SystemClock clock;
-  auto participant = bus::Participant::Create({.domain = common.domain,
-                                               .station = common.station,
-                                               .name = kName,
-                                               .interfaces = common.interfaces,
-                                               .peers = common.peers,
-                                               .discovery_servers = common.discovery_servers,
-                                               .best_effort_topics = common.best_effort,
-                                               .security = common.security,
-                                               .clock = &clock,
-                                               .log = log.get()});
+  bus::ParticipantOptions network{.domain = common.domain,
+                                  .station = common.station,
+                                  .name = kName,
+                                  .interfaces = common.interfaces,
+                                  .peers = common.peers,
+                                  .discovery_servers = common.discovery_servers,
+                                  .best_effort_topics = common.best_effort,
+                                  .security = common.security,
+                                  .log = log.get()};
+  auto time = bus::StationClock::Create(common.clock, network, "gateway", signals.token());
+  if (!time) return program::Fail(kName, time.error());
+  const Clock& clock = **time;
+  auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
 
-  auto hub = gateway::TopicHub::Create(
-      **participant, **participant, clock,
-      {.publish = words.publish, .known = gateway::KnownTopics(), .max_subscriptions = 4096});
+  auto hub = gateway::TopicHub::Create(**participant, **participant, clock,
+                                       {.publish = words.publish,
+                                        .known = gateway::KnownTopics(),
+                                        .decode_status = bus::Decode<ircp::StatusSample>,
+                                        .max_subscriptions = 4096});
   if (!hub) return program::Fail(kName, hub.error());
   gateway::TopicServer topics(**hub, {.queue = words.queue});
   rpc::CallLog calls(*log);
@@ -69,7 +75,8 @@ int main(int argc, char** argv) {
   }
   std::unique_ptr<gateway::Ros2Side> ros2;
   if (words.ros2) {
-    auto made = gateway::Ros2Side::Create(words, common, **participant, clock, *log);
+    auto made =
+        gateway::Ros2Side::Create(words, common, **participant, clock, time->is_simulated(), *log);
     if (!made) return program::Fail(kName, made.error());
     ros2 = std::move(*made);
     for (Metric& metric : ros2->metrics()) figures.push_back(std::move(metric));
@@ -81,7 +88,7 @@ int main(int argc, char** argv) {
     if (!made) return program::Fail(kName, made.error());
     http = std::move(*made);
     auto drawn = gateway::FoxgloveSide::Create(words, common, **hub, http->calls(), http->server(),
-                                               clock, *log);
+                                               clock, time->is_simulated(), *log);
     if (!drawn) return program::Fail(kName, drawn.error());
     foxglove = std::move(*drawn);
     if (const Status added = gateway::AddWebSide(words, http->server(), *log); !added) {
@@ -96,6 +103,9 @@ int main(int argc, char** argv) {
   const auto metrics = program::ServeMetrics(common, std::move(figures));
   if (!metrics) return program::Fail(kName, metrics.error());
   log->Info("ready", {{"address", (*server)->address()}, {"station", common.station}});
+  // The simulated time need not wait for who only looks on.
+  NullLog unsaid;
+  time->Begin(ircp::NetworkClock::Caller::kOnlyWaits, unsaid, signals.token());
   signals.Wait();
   if (http) http->Stop();
   (*server)->Shutdown(std::chrono::seconds(1));

@@ -13,7 +13,7 @@ namespace {
 class Side final : public Ros2Side {
  public:
   Status Start(const ProgramOptions& words, const program::CommonOptions& common,
-               ircp::Bus& station, const Clock& clock, Log& log) {
+               ircp::Bus& station, const Clock& clock, bool is_simulated, Log& log) {
     if (!words.robot.empty()) {
       auto robot = kinematics::ReadRobotDescription(words.robot);
       if (!robot.ok()) return robot.error();
@@ -22,6 +22,7 @@ class Side final : public Ros2Side {
     auto graph = bus::Participant::Create({.domain = common.domain,
                                            .without_station = true,
                                            .name = "exemplar-gateway-ros2",
+                                           .user_data = "enclave=/;",  // as ROS 2's are marked
                                            .interfaces = common.interfaces,
                                            .peers = common.peers,
                                            .discovery_servers = common.discovery_servers,
@@ -29,9 +30,11 @@ class Side final : public Ros2Side {
                                            .log = &log});
     if (!graph.ok()) return graph.error();
     graph_ = std::move(*graph);
-    auto bridge = Ros2Bridge::Create(
-        station, *graph_, *graph_, robot_ ? &*robot_ : nullptr,
-        {.max_rate_hz = words.ros2_rate_hz, .robot_from = words.ros2_robot_from}, log);
+    auto bridge = Ros2Bridge::Create(station, *graph_, *graph_, robot_ ? &*robot_ : nullptr,
+                                     {.max_rate_hz = words.ros2_rate_hz,
+                                      .robot_from = words.ros2_robot_from,
+                                      .clock = is_simulated ? &clock : nullptr},
+                                     log);
     if (!bridge.ok()) return bridge.error();
     bridge_ = std::move(*bridge);
     return {};
@@ -50,7 +53,7 @@ class Side final : public Ros2Side {
 Result<std::unique_ptr<Ros2Side>> Ros2Side::Create(const ProgramOptions& words,
                                                    const program::CommonOptions& common,
                                                    ircp::Bus& station, const Clock& clock,
-                                                   Log& log) {
+                                                   bool is_simulated, Log& log) {
   if (!common.security.empty()) {
     return InvalidArgument(
         "--ros2 would publish a secured station's robot to everybody: leave out one of --ros2 and "
@@ -58,7 +61,8 @@ Result<std::unique_ptr<Ros2Side>> Ros2Side::Create(const ProgramOptions& words,
         "ros2");
   }
   auto side = std::make_unique<Side>();
-  if (const Status started = side->Start(words, common, station, clock, log); !started.ok()) {
+  if (const Status started = side->Start(words, common, station, clock, is_simulated, log);
+      !started.ok()) {
     return started.error();
   }
   return std::unique_ptr<Ros2Side>(std::move(side));
