@@ -1,25 +1,33 @@
 // Whether a tool path can be reached at all, by brute force: many random postures a pose, each
-// moved onto the pose by plain damped least squares and checked for collisions. Shares no code with
-// the executor's inverse kinematics or its search.
+// moved onto the pose by plain damped least squares and checked for collisions by MuJoCo, as the
+// simulator's robot would collide. Shares no code with the executor's inverse kinematics, its
+// search or its collision checks. Where links of the robot meet each other, only what overlaps
+// collides: a posture is rather called clear than not.
 //
 //   workspace_judge --robot DIR                   prints the tool's pose at home
 //   workspace_judge --robot DIR --scene FILE      reads poses from stdin, one a line:
 //       WORD x y z qx qy qz qw                    WORD: touching, near or free
 
+#include <mujoco/mujoco.h>
+
 #include <Eigen/Dense>
 #include <cmath>
 #include <iostream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "exemplar/base/rng.hpp"
-#include "exemplar/collision/scene.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
 #include "exemplar/motion/plan.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
+#include "simulator/mjcf_writer.hpp"
+#include "simulator/world.hpp"
 
 namespace exemplar {
 namespace {
@@ -67,6 +75,65 @@ bool Reach(const kinematics::Chain& chain, const geometry::Pose& goal, double po
   return false;
 }
 
+/// The simulated robot in its scene, put into postures.
+class Contacts {
+ public:
+  /// `clearance_m`: what is nearer to the scene than this touches it.
+  Contacts(const simulator::World& world, const kinematics::RobotDescription& robot,
+           const scene::Description& scene, double clearance_m)
+      : model_(mj_copyModel(nullptr, world.model()), mj_deleteModel),
+        data_(mj_makeData(model_.get()), mj_deleteData) {
+    for (int geom = 0; geom < model_->ngeom; ++geom) model_->geom_margin[geom] = clearance_m;
+    for (const std::string& joint : robot.chain.joint_names()) {
+      const int id = mj_name2id(model_.get(), mjOBJ_JOINT, simulator::RobotJoint(joint).c_str());
+      places_.push_back(model_->jnt_qposadr[id]);
+    }
+    const auto body = [this](const std::string& name) {
+      return mj_name2id(model_.get(), mjOBJ_BODY, name.c_str());
+    };
+    for (const kinematics::Link& link : robot.model.links) {
+      robot_.insert(body(simulator::LinkBody(link.name)));
+    }
+    for (const std::string& link : robot.touch_links) {
+      touch_.insert(body(simulator::LinkBody(link)));
+    }
+    for (const scene::Button& button : scene.buttons) {
+      buttons_.insert(body(simulator::ThingBody(button.name)));
+      buttons_.insert(body(simulator::CapBody(button.name)));
+    }
+  }
+
+  /// Whether the robot at `q` is clear of everything but, with `may_touch`, its touch links of the
+  /// buttons.
+  bool IsClear(const Eigen::VectorXd& q, bool may_touch) {
+    for (std::size_t j = 0; j < places_.size(); ++j) {
+      data_->qpos[places_[j]] = q[static_cast<Eigen::Index>(j)];
+    }
+    mj_kinematics(model_.get(), data_.get());
+    mj_comPos(model_.get(), data_.get());
+    mj_collision(model_.get(), data_.get());
+    for (int i = 0; i < data_->ncon; ++i) {
+      const mjContact& contact = data_->contact[i];
+      const int a = model_->geom_bodyid[contact.geom1];
+      const int b = model_->geom_bodyid[contact.geom2];
+      const bool both = robot_.count(a) != 0 && robot_.count(b) != 0;
+      if ((both && contact.dist >= 0) || (robot_.count(a) == 0 && robot_.count(b) == 0)) continue;
+      const bool is_touch = (touch_.count(a) != 0 && buttons_.count(b) != 0) ||
+                            (touch_.count(b) != 0 && buttons_.count(a) != 0);
+      if (!(may_touch && is_touch)) return false;
+    }
+    return true;
+  }
+
+ private:
+  std::unique_ptr<mjModel, void (*)(mjModel*)> model_;
+  std::unique_ptr<mjData, void (*)(mjData*)> data_;
+  std::vector<int> places_;  ///< of the chain's joints within qpos
+  std::set<int> robot_;      ///< bodies
+  std::set<int> touch_;
+  std::set<int> buttons_;
+};
+
 nlohmann::json ToJson(const geometry::Pose& pose) {
   const Eigen::Vector3d& p = pose.translation;
   const Eigen::Quaterniond& r = pose.rotation;
@@ -102,15 +169,11 @@ int main(int argc, char** argv) {
   }
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene) return program::Fail(kName, scene.error());
-  const auto checker = collision::CollisionChecker::Create(
-      robot->model, collision::MakeScene(*scene), collision::OptionsOf(*robot));
-  if (!checker) return program::Fail(kName, checker.error());
-  std::vector<collision::AllowedTouch> touch;
-  for (const std::string& link : robot->touch_links) {
-    for (const scene::Button& button : scene->buttons) touch.push_back({link, button.name});
-  }
+  const auto world = simulator::World::Create(*robot, *scene);
+  if (!world) return program::Fail(kName, world.error());
 
   const motion::PlanOptions plan;  // for its tolerances
+  Contacts contacts(*world, *robot, *scene, plan.required_clearance_m);
   Rng rng(1);
   nlohmann::json verdicts = nlohmann::json::array();
   for (std::string line; std::getline(std::cin, line);) {
@@ -128,10 +191,7 @@ int main(int argc, char** argv) {
       Eigen::VectorXd q = RandomPosture(robot->chain, rng);
       if (!Reach(robot->chain, goal, position_m, plan.rotation_tolerance_rad, q)) continue;
       ++judged.reached;
-      const collision::Clearance room = checker->SmallestClearance(
-          kinematics::FullJointVector(robot->model, robot->chain, q),
-          where == "free" ? std::vector<collision::AllowedTouch>() : touch);
-      if (room.distance_m >= plan.required_clearance_m) ++judged.clear;
+      if (contacts.IsClear(q, where != "free")) ++judged.clear;
     }
     verdicts.push_back({{"reached", judged.reached}, {"clear", judged.clear}});
   }

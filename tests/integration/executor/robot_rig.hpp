@@ -161,7 +161,7 @@ class RobotRig : public ::testing::Test {
     if (!speaks_) return;
     PublishState();
     // A busy machine must not let the checks fall behind: in the world there are 8 ms for them.
-    if (awaits_checks_) Await([this] { return over_ || executor_->HasTaken({}); });
+    if (awaits_checks_) Await([this] { return over_ || executor_->IsSettled(); });
   }
 
   void Steps(int count) {

@@ -114,6 +114,50 @@ TEST(JointMap, LeonardosSuitDrivesItsNineJoints) {
   EXPECT_EQ(map->Bind(suit).size(), 9U);
 }
 
+/// Of a small motion of one joint at home: the tool's, metres, and a third of a metre for a radian.
+Eigen::Matrix<double, 6, 1> ToolMotion(const kinematics::RobotDescription& robot, int joint) {
+  Eigen::Matrix<double, 6, Eigen::Dynamic> jacobian(6, robot.chain.dof());
+  (void)robot.chain.ToolPoseAndJacobian(robot.home, jacobian);
+  Eigen::Matrix<double, 6, 1> motion = jacobian.col(joint);
+  motion.tail<3>() /= 3;
+  return motion;
+}
+
+TEST(JointMap, AToolGoesWhereTheOperatorsHandGoesWhateverTheRobot) {
+  const std::filesystem::path models =
+      std::filesystem::path(EXEMPLAR_SOURCE_DIR) / "deploy" / "models";
+  const auto person = kinematics::ReadRobotDescription(models / "leonardo");
+  ASSERT_TRUE(person.ok());
+  const std::vector<std::string> suit = {"torso rotation",
+                                         "hip front/back",
+                                         "hip side/side",
+                                         "right shoulder in/out",
+                                         "right shoulder forward/backward",
+                                         "right upper-arm rotation",
+                                         "right elbow in/out",
+                                         "right forearm rotation",
+                                         "right wrist in/out"};
+  for (const auto& [model, driven] : {std::pair("arm7", 6U), std::pair("ur5e_like", 5U)}) {
+    const auto robot = kinematics::ReadRobotDescription(models / model);
+    ASSERT_TRUE(robot.ok());
+    const auto map = JointMap::Read(models / model / "suit.yaml", robot->chain.joint_names());
+    ASSERT_TRUE(map.ok()) << map.error().message;
+    const auto bindings = map->Bind(suit);
+    EXPECT_EQ(bindings.size(), driven) << model;
+    for (const JointMap::Binding& binding : bindings) {
+      const std::string place = std::string(model) + ": " + suit[std::size_t(binding.place)];
+      // Joints of the suit stand in the order of the body's.
+      EXPECT_NEAR(binding.scale * person->home[binding.place] + binding.offset,
+                  robot->home[binding.joint], 1e-4)
+          << place;
+      const Eigen::Matrix<double, 6, 1> hand = ToolMotion(*person, binding.place);
+      const Eigen::Matrix<double, 6, 1> tool =
+          std::copysign(1.0, binding.scale) * ToolMotion(*robot, binding.joint);
+      EXPECT_GT(hand.normalized().dot(tool.normalized()), 0.5) << place;
+    }
+  }
+}
+
 // ---------------------------------------------------------------- suit
 
 class SuitTest : public ::testing::Test {
