@@ -41,7 +41,10 @@ const actions = {
   shown: ({ of }) => page.isVisible(of),
   /** Until an element's text holds `text`; its text then. */
   says: async ({ of, text }) => {
-    await page.waitForFunction(([selector, wanted]) => document.querySelector(selector)?.textContent.includes(wanted), [of, text]);
+    const wait = page.waitForFunction(([selector, wanted]) => document.querySelector(selector)?.textContent.includes(wanted), [of, text]);
+    await wait.catch(async (error) => {
+      throw new Error(`${error.message} It says "${await page.textContent(of)}"; the robot "${await page.textContent("#robot-state")}: ${await page.textContent("#robot-detail")}"`);
+    });
     return page.textContent(of);
   },
   hides: ({ of }) => page.waitForSelector(of, { state: "hidden" }).then(() => true),

@@ -251,6 +251,7 @@ class WebTest(unittest.TestCase):
         type(self).executor_program, _ = self.server(*self.executor_words(), listen=self.executor)
         wait_for(lambda: "does not answer" not in page("text", of="#services"), "the executor to be back on the page", 40)
         page("says", of="#robot-state", text="idle")
+        wait_for(lambda: exemplar("--server", self.address, "robot", "status").get("joint_names"), "the robot's joint state")
 
     def test_nothing_is_loaded_from_elsewhere_and_no_script_failed(self):
         told = self.page("problems")
