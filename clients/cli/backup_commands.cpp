@@ -25,6 +25,12 @@ struct Words {
   bool dry_run = false;
   bool needed_too = false;
   std::optional<double> keep_days, keep_versions_days;
+
+  /// Of the services, for a backup; empty: all.
+  std::string Chosen() const {
+    if (!only.empty()) return only;
+    return recordings ? "" : "learning";
+  }
 };
 
 backup::BytesProgress Showing(ProgressDisplay& display, std::string step) {
@@ -75,11 +81,11 @@ int Create(const Session& session, const Words& words) {
   const auto writer = backup::Writer::Create(words.file, SystemClock().Now(), program::Version());
   if (!writer) return Fail(writer.error());
   ProgressDisplay display;
-  for (const DataService& service : DataServices(*clients, words.recordings ? "" : "learning")) {
+  for (const DataService& service : DataServices(*clients, words.Chosen())) {
     const auto sink = (*writer)->NextService(Showing(display, "copying " + service.name));
     const Status copied = service.api->Backup(*sink, signals.token());
     display.Clear();
-    if (!copied) return Fail(WithPlace(copied.error(), service.name));
+    if (!copied) return Fail(OfService(copied.error(), service.name));
   }
   const Result<backup::Manifest> manifest = (*writer)->Finish();
   if (!manifest) return Fail(manifest.error());
@@ -151,7 +157,7 @@ int Restore(const Session& session, const Words& words) {
     if (!source) return Fail(source.error());
     const Result<api::DataReport> report = service.api->Restore(request, **source);
     display.Clear();
-    if (!report) return Fail(WithPlace(report.error(), service.name));
+    if (!report) return Fail(OfService(report.error(), service.name));
     if (words.format == "json") {
       nlohmann::json json = cli::ToJson(*report);
       json["service"] = service.name;
@@ -239,6 +245,7 @@ void AddBackupCommands(Command& root, const Session& session) {
   verify.Runs([verified] { return Verify(*verified); });
   command.OptionalArgument("FILE", made->file, "gets the backup; must not be there");
   command.Flag("--recordings", made->recordings, "the recorder's recordings as well");
+  AddOnly(command, made->only);
   AddFormat(command, made->format, {"text", "json"});
   command.Runs([&session, made] { return Create(session, *made); });
 

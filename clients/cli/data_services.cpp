@@ -23,6 +23,12 @@ void AddOnly(Command& command, std::string& only) {
 
 bool IsNotServed(const Error& error) { return error.code == ErrorCode::kUnimplemented; }
 
+Error OfService(const Error& error, const std::string& service) {
+  Error named = WithPlace(error, service);
+  if (IsNotServed(error)) named.message += " (give the gateway's address, or --only SERVICE)";
+  return named;
+}
+
 nlohmann::json ToJson(const api::DataReport& report) {
   nlohmann::json items = nlohmann::json::array();
   for (const api::DataItem& item : report.items) {

@@ -23,6 +23,8 @@ void AddOnly(Command& command, std::string& only);
 /// Whether the server does not serve this at all: one service was named where the gateway was
 /// meant.
 bool IsNotServed(const Error& error);
+/// Says whose error it is, and what helps where that service is not served.
+Error OfService(const Error& error, const std::string& service);
 
 nlohmann::json ToJson(const api::DataReport& report);
 /// A line an item, behind the service's name.

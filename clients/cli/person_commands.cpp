@@ -134,7 +134,7 @@ int Erase(const Session& session, Words words) {
     Result<api::DataReport> report =
         service.api->Erase({.person = words.person, .dry_run = true}, {}, signals.token());
     if (!report) {
-      return Fail(WithPlace(report.error(), "nothing was erased: " + service.name));
+      return Fail(WithPlace(OfService(report.error(), service.name), "nothing was erased"));
     }
     items += report->items.size();
     foreseen.emplace_back(service.name, *std::move(report));
@@ -164,8 +164,8 @@ int Erase(const Session& session, Words words) {
     display.Clear();
     if (!report) {
       PrintReports(words, done);
-      return Fail(
-          WithPlace(report.error(), "the erasure is not complete; run it again: " + service.name));
+      return Fail(WithPlace(OfService(report.error(), service.name),
+                            "the erasure is not complete; run it again"));
     }
     items += report->items.size();
     done.emplace_back(service.name, *std::move(report));

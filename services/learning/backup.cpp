@@ -25,7 +25,7 @@ Status ForEachRow(Database& database, std::string_view sql, const Visit& visit) 
 
 /// All rows but the large ones' bytes, and what the backup will hold.
 struct Description {
-  Json store;
+  std::string rows;  ///< "store.json"
   api::BackupPlan plan;
 };
 
@@ -33,11 +33,10 @@ Result<Description> Describe(Database& database) {
   Description all;
   all.plan.service = "learning";
   all.plan.schema = NewestSchema();
-  all.store = {{"schema", NewestSchema()},          {"trials", Json::array()},
-               {"skills", Json::array()},           {"versions", Json::array()},
-               {"version_numbers", Json::object()}, {"trial_persons", Json::object()},
-               {"erased_persons", Json::array()}};
-  Json& store = all.store;
+  Json store = {{"schema", NewestSchema()},          {"trials", Json::array()},
+                {"skills", Json::array()},           {"versions", Json::array()},
+                {"version_numbers", Json::object()}, {"trial_persons", Json::object()},
+                {"erased_persons", Json::array()}};
   const auto add_part = [&](std::int64_t bytes) {
     ++all.plan.parts;
     all.plan.bytes += static_cast<std::uint64_t>(bytes);
@@ -92,6 +91,9 @@ Result<Description> Describe(Database& database) {
   for (const char* name : {"trials", "skills", "versions"}) {
     all.plan.counts[name] = store[name].size();
   }
+  all.rows = DumpJson(store);
+  ++all.plan.parts;
+  all.plan.bytes += all.rows.size();
   return all;
 }
 
@@ -113,14 +115,11 @@ Status Store::BackUp(api::BackupSink& sink, const std::stop_token& stop) {
   if (!database) return database.error();
   // From its first reading on, this transaction sees the database as it is then.
   if (Status begun = (*database)->Execute("BEGIN"); !begun) return begun;
-  Result<Description> all = Describe(**database);
+  const Result<Description> all = Describe(**database);
   if (!all) return all.error();
-  const std::string rows = DumpJson(all->store);
-  ++all->plan.parts;
-  all->plan.bytes += rows.size();
   if (Status begun = sink.Begin(all->plan); !begun) return begun;
-  if (Status begun = sink.BeginPart({"store.json", rows.size()}); !begun) return begun;
-  if (Status sent = sink.Write(rows); !sent) return sent;
+  if (Status begun = sink.BeginPart({"store.json", all->rows.size()}); !begun) return begun;
+  if (Status sent = sink.Write(all->rows); !sent) return sent;
   for (const char* sql :
        {"SELECT 'trials/' || id || '.zst', file FROM trials ORDER BY number",
         "SELECT 'skills/' || skill || '/' || version || '.zst', document FROM versions"

@@ -70,6 +70,7 @@ class RecordingsImpl final : public Recordings {
       info.last = std::max(info.last, recording.end);
     }
     std::vector<api::PersonInfo> list;
+    list.reserve(persons.size());
     for (const auto& [person, info] : persons) list.push_back(info);
     return list;
   }

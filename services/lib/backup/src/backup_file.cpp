@@ -203,7 +203,8 @@ class ServiceSource final : public api::BackupSource {
     hash_.Add(*bytes);
     if (progress_) progress_(tar_->position(), tar_->size());
     if (!bytes->empty()) return bytes;
-    const PartFacts& facts = **std::exchange(part_, std::nullopt);
+    const PartFacts facts = **part_;
+    part_.reset();
     if (hash_.Hex() != facts.sha256) return Changed(facts.name);
     return bytes;
   }
