@@ -94,6 +94,7 @@ Status Executor::Connect(ircp::Bus& bus) {
   control_->SetValues([this] {
     std::map<std::string, std::string> values = {{"speed", FormatDouble(speed_.load())}};
     const std::lock_guard lock(mutex_);
+    if (!holder_.empty() && IsMoving(state_.load())) values["holder"] = holder_;
     if (run_ != nullptr && !run_over_) {
       values["time_s"] = FormatFixed(run_->path_time_s(), 3);
       values["duration_s"] = FormatFixed(run_->duration_s(), 3);
@@ -238,7 +239,7 @@ void Executor::OnJointState(const ircp::JointStateSample& sample) {
     measured_.notify_one();
     teleoperation_->Measure(*state);
   }
-  state_seq_.store(sample.header.seq);
+  has_state_.store(true);
   if (options_.on_taken) options_.on_taken();
 }
 
@@ -258,16 +259,17 @@ void Executor::OnObject(const ircp::ObjectSample& sample) {
     following = following_;
   }
   if (following) following->Take(sample.name);
-  if (sample.header.source == ircp::kTrackerSource) tracker_seq_.store(sample.header.seq);
   if (options_.on_taken) options_.on_taken();
 }
 
-bool Executor::HasTaken(const ircp::SentInputs& sent) const {
-  const std::uint64_t states = state_seq_.load();
-  const std::uint64_t objects = tracker_seq_.load();
-  if (states == 0 && state_reader_->matched_writers() == 0) return false;
-  if (states > 0 && states < sent.joint_states) return false;
-  if (objects > 0 && objects < sent.objects) return false;
+bool Executor::IsSettled() const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_publishing_ || !transitions_.empty()) return false;
+  }
+  if (!teleoperation_->IsSettled()) return false;
+  commands_->Flush();
+  if (!has_state_.load() && state_reader_->matched_writers() == 0) return false;
   const std::lock_guard lock(measuring_mutex_);
   return !measuring_ || !measuring_->has_unwatched();
 }
@@ -315,11 +317,6 @@ ExecutorFigures Executor::figures() const {
 
 std::vector<ircp::TopicCount> Executor::sent() const {
   return {{ircp::JointCommandSample::kTopic, kProgram, commands_->sent()}};
-}
-
-std::uint64_t Executor::CommandsSent() const {
-  commands_->Flush();
-  return commands_->sent();
 }
 
 std::vector<ircp::TopicReader> Executor::readers() const {
@@ -492,6 +489,7 @@ Result<api::ExecutionResult> Executor::Execute(
     const std::lock_guard lock(mutex_);
     fixed_ = planned->objects;
     placed_ = std::move(planned->placed);
+    carries_ = std::move(planned->carries);
   }
   run->SetFollower(following.get());
   const Status started = Apply(Event::kStart, "executing \"" + request.skill + "\"", run);

@@ -103,11 +103,8 @@ class Executor final : public api::ExecutorApi {
 
   ExecutorFigures figures() const;
   std::vector<ircp::TopicCount> sent() const;
-  /// Joint commands so far; returns when those on their way have left.
-  std::uint64_t CommandsSent() const;
-  /// Whether all that a simulator has sent was taken in and looked at; what was sent before the
-  /// first of it came does not count.
-  bool HasTaken(const ircp::SentInputs& sent) const;
+  /// Whether all that came was looked at and all commands have left; not before the robot is there.
+  bool IsSettled() const;
   std::vector<ircp::TopicReader> readers() const;
 
   /// Brings a motion to rest on its path and returns when it rests; nothing is executed afterwards.
@@ -161,8 +158,7 @@ class Executor final : public api::ExecutorApi {
   const FollowingPlanner following_planner_;
   std::atomic<std::int64_t> state_received_ns_;
   std::atomic<std::int64_t> safety_received_ns_;
-  std::atomic<std::uint64_t> state_seq_{0};    ///< of the last joint state
-  std::atomic<std::uint64_t> tracker_seq_{0};  ///< of the last pose of ircp::kTrackerSource
+  std::atomic<bool> has_state_{false};  ///< a joint state has come
   std::atomic<double> speed_{1.0};
   std::atomic<State> state_{State::kIdle};  ///< written under mutex_
   std::atomic<std::uint64_t> plans_refused_{0};
@@ -191,12 +187,14 @@ class Executor final : public api::ExecutorApi {
   std::shared_ptr<Following> following_;     ///< of run_, where its target is followed
   std::vector<geometry::NamedPose> fixed_;   ///< what run_ is about
   std::vector<geometry::NamedPose> placed_;  ///< where everything was taken to be
+  std::vector<motion::Carry> carries_;       ///< of run_
   bool run_over_ = true;                     ///< the control loop is through with run_
   State run_end_ = State::kIdle;             ///< the state that ended its motion, and why
   std::string run_detail_;
   std::uint64_t beats_ = 0;  ///< a tenth of a second of motion each
   std::optional<Eigen::VectorXd> last_command_;
   std::deque<Transition> transitions_;
+  bool is_publishing_ = false;  ///< one that was among them
   std::map<std::string, std::uint64_t> executions_;
   bool closing_ = false;
 

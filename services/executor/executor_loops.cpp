@@ -103,6 +103,7 @@ void Executor::WatchLoop(const std::stop_token& stop) {
   std::shared_ptr<MotionRun> run;  // beside the loop that runs it and the call that asked for it
   std::vector<geometry::NamedPose> fixed;
   std::vector<geometry::NamedPose> placed;
+  std::vector<motion::Carry> carries;
   while (true) {
     std::shared_ptr<MotionRun> next;
     {
@@ -118,8 +119,9 @@ void Executor::WatchLoop(const std::stop_token& stop) {
       const std::lock_guard lock(mutex_);
       fixed = fixed_;
       placed = placed_;
+      carries = carries_;
     }
-    std::optional<collision::Scene> moved = planner_.MovedScene(fixed, placed);
+    std::optional<collision::Scene> moved = planner_.MovedScene(fixed, carries, placed);
     if (moved) {
       const Status set = run->SetScene(*std::move(moved));
       if (!set.ok()) log_.Warning("an object's place is not used", {{"why", set.error().message}});
@@ -140,6 +142,7 @@ void Executor::PublishLoop(const std::stop_token& stop) {
       if (transitions_.empty()) return;
       now = std::move(transitions_.front());
       transitions_.pop_front();
+      is_publishing_ = true;
     }
     if (now.from) {
       const bool bad = now.state == State::kProtectiveStop || now.state == State::kEmergencyStop;
@@ -149,6 +152,11 @@ void Executor::PublishLoop(const std::stop_token& stop) {
                   {"detail", now.detail}});
     }
     control_->SetState(std::string(ToString(now.state)), now.detail);
+    {
+      const std::lock_guard lock(mutex_);
+      is_publishing_ = false;
+    }
+    if (options_.on_taken) options_.on_taken();
   }
 }
 

@@ -22,6 +22,18 @@ constexpr double kGoodPlan_m = 1.5e-3;
 constexpr double kJudged_s = 0.05;
 constexpr std::size_t kMostSeen = 20'000;
 
+/// The frame at or before a time of a path, and how much of the way to the next is gone.
+std::pair<std::size_t, double> PlaceAt(const std::vector<double>& time_s, double at_s) {
+  const auto after = std::upper_bound(time_s.begin() + 1, time_s.end() - 1, at_s);
+  const auto frame = static_cast<std::size_t>(after - time_s.begin()) - 1;
+  return {frame,
+          std::clamp((at_s - time_s[frame]) / (time_s[frame + 1] - time_s[frame]), 0.0, 1.0)};
+}
+
+double DepthAt(const FollowedPath& path, std::size_t frame, double part) {
+  return (1 - part) * path.depth_m[frame] + part * path.depth_m[frame + 1];
+}
+
 }  // namespace
 
 Following::Following(const Clock& clock, Log& log, const FollowingPlanner& planner,
@@ -35,11 +47,13 @@ Following::Following(const Clock& clock, Log& log, const FollowingPlanner& plann
       target_(plan.target),
       object_p_contact_(plan.object_p_contact),
       times_(plan.times),
+      press_(plan.press),
       first_(first),
       lever_m_(plan.lever_m),
       offset_(Eigen::VectorXd::Zero(robot.chain.dof())),
       offset_rate_(offset_),
       wanted_(offset_),
+      lift_(offset_),
       ahead_q_(offset_),
       ahead_v_(offset_),
       first_q_(offset_),
@@ -107,11 +121,7 @@ void Following::Correct(double path_time_s, double rate, double elapsed_s,
   if (std::unique_lock lock(aim_mutex_, std::try_to_lock); lock) used_aim_ = aim_;
 
   const FollowedPath& path = *path_.load(std::memory_order_acquire);
-  const std::vector<double>& time = path.trajectory.time_s;
-  const auto after = std::upper_bound(time.begin() + 1, time.end() - 1, path_time_s);
-  const auto frame = static_cast<std::size_t>(after - time.begin()) - 1;
-  const double part =
-      std::clamp((path_time_s - time[frame]) / (time[frame + 1] - time[frame]), 0.0, 1.0);
+  const auto [frame, part] = PlaceAt(path.trajectory.time_s, path_time_s);
   const double share = (1 - part) * path.share[frame] + part * path.share[frame + 1];
   const Eigen::Vector3d wanted_m = share * Wanted(path, frame, part, now);
   wanted_.noalias() = path.joints_m[frame] * wanted_m;
@@ -122,6 +132,12 @@ void Following::Correct(double path_time_s, double rate, double elapsed_s,
     Judge(path_time_s, (1 - kept) * wanted_m.norm(), now);
   } else {  // It is to stand still, whatever the target does.
     wanted_ = offset_;
+    kept = 1;
+  }
+  const double back_m = deepest_m_ && rate > 0 ? DepthAt(path, frame, part) - *deepest_m_ : 0;
+  if (back_m > 0) {
+    lift_.noalias() = path.joints_m[frame] * press_->base_inward;
+    wanted_ = kept * wanted_ - back_m * lift_;
     kept = 1;
   }
 
@@ -144,9 +160,15 @@ void Following::Correct(double path_time_s, double rate, double elapsed_s,
   }
 }
 
+void Following::LiftOff(double path_time_s) {
+  const FollowedPath& path = *path_.load(std::memory_order_acquire);
+  const auto [frame, part] = PlaceAt(path.trajectory.time_s, path_time_s);
+  deepest_m_ = DepthAt(path, frame, part) - press_->lift_m;
+}
+
 void Following::Judge(double path_time_s, double residual_m, Duration now) {
   if (fault_.load(std::memory_order_relaxed) != Fault::kNone) return;
-  if (path_time_s > times_.release_s) return;
+  if (path_time_s > times_.release_s || deepest_m_) return;
   const auto fail = [this](Fault fault, double value) {
     fault_value_.store(value);
     fault_.store(fault, std::memory_order_release);
@@ -214,7 +236,7 @@ void Following::PlanOnce(const std::stop_token& stop) {
 
   const Duration begin = clock_.Steady();
   const Result<FollowingPlan> fresh =
-      planner_.Again(request_, target_, first_, times_, start, stop);
+      planner_.Again(request_, target_, first_, times_, press_.has_value(), start, stop);
   if (!fresh.ok()) {
     log_.Debug("no new plan", {{"cause", fresh.error().message}});
     return;
@@ -222,10 +244,10 @@ void Following::PlanOnce(const std::stop_token& stop) {
   const double begin_s = path_time_s_.load() + kProofTime_s;
   auto path = std::make_unique<FollowedPath>(
       Blend(robot_.chain, now, fresh->path, first_.trajectory,
-            fresh->times.contact_s - times_.contact_s, begin_s, times_));
+            fresh->times.contact_s - times_.contact_s, begin_s, times_, press()));
   if (!KeepsLimits(path->trajectory, robot_.chain.limits(), begin_s) ||
       !Prove(robot_, fresh->planned.checker, first_, planner_.required_clearance_m(), begin_s,
-             times_, *path)) {
+             times_, press(), *path)) {
     log_.Debug("new plan not used", {{"cause", "limits or clearance of the change to it"}});
     return;
   }

@@ -38,6 +38,8 @@ struct FollowingOptions {
   /// A target that was seen to turn at one end is watched for so long at most until it turned at
   /// the other.
   double longest_watch_s = 12;
+  /// A press of a moving target looks for touch no longer than this: it goes faster where needed.
+  double longest_press_s = 0.4;
 };
 
 /// A plan that meets a moving target.
@@ -48,6 +50,8 @@ struct FollowingPlan {
   Eigen::Vector3d object_p_contact =
       Eigen::Vector3d::Zero();  ///< base axes, from the target's origin
   TargetTimes times;
+  double over_s = 0;                 ///< so long, on the motion's time, the target may not turn
+  std::optional<TargetPress> press;  ///< where it ends by touch
   FollowedPath path;
   Eigen::VectorXd lever_m;  ///< of each joint of the chain, as CollisionChecker::LongestLevers
 };
@@ -69,7 +73,7 @@ class FollowingPlanner {
   /// that had begun at `start`, so that it meets the target at the same time.
   Result<FollowingPlan> Again(const api::ExecuteRequest& request, const std::string& target,
                               const motion::PlannedMotion& first, const TargetTimes& times,
-                              Duration start, const std::stop_token& stop) const;
+                              bool guarded, Duration start, const std::stop_token& stop) const;
 
   Result<std::pair<TargetTrack, geometry::Pose>> Seen(const std::string& target) const;
   const FollowingOptions& options() const { return options_; }
@@ -81,8 +85,11 @@ class FollowingPlanner {
                                 const TargetTrack& track, const geometry::Pose& seen,
                                 Duration contact, const std::vector<double>& frame_time_s,
                                 const std::optional<Eigen::VectorXd>& from,
+                                std::optional<bool> guarded,
                                 const std::optional<Eigen::VectorXd>& last_command,
                                 const std::stop_token& stop) const;
+  /// What belongs to the plan's path, and its proof; false where a touch would not find a way out.
+  bool Complete(const TargetTrack& track, FollowingPlan& plan) const;
 
   const Clock& clock_;
   const Planner& planner_;
@@ -110,6 +117,7 @@ class Following final : public PathFollower {
 
   void Correct(double path_time_s, double rate, double elapsed_s,
                Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity) override;
+  void LiftOff(double path_time_s) override;
   std::optional<std::string> Problem() const override;
 
   /// Writes how near the measured tool came to the contact, as the target was seen.
@@ -127,6 +135,7 @@ class Following final : public PathFollower {
   void PlanLoop(const std::stop_token& stop);
   void Judge(double path_time_s, double residual_m, Duration now);
   Eigen::Vector3d Wanted(const FollowedPath& path, std::size_t frame, double part, Duration now);
+  const TargetPress* press() const { return press_ ? &*press_ : nullptr; }
 
   const Clock& clock_;
   Log& log_;
@@ -136,6 +145,7 @@ class Following final : public PathFollower {
   const std::string target_;
   const Eigen::Vector3d object_p_contact_;
   const TargetTimes times_;
+  const std::optional<TargetPress> press_;
   const motion::PlannedMotion first_;                       ///< the motion as it began
   const Eigen::VectorXd lever_m_;                           ///< of the chain's joints
   std::vector<std::unique_ptr<const FollowedPath>> paths_;  ///< all that were in use
@@ -151,7 +161,8 @@ class Following final : public PathFollower {
   Aim aim_;
   // Of the control loop.
   Aim used_aim_;
-  Eigen::VectorXd offset_, offset_rate_, wanted_, ahead_q_, ahead_v_, first_q_, first_v_;
+  std::optional<double> deepest_m_;  ///< the tool goes no deeper any more: it met its touch
+  Eigen::VectorXd offset_, offset_rate_, wanted_, lift_, ahead_q_, ahead_v_, first_q_, first_v_;
 
   mutable std::mutex seen_mutex_;
   std::condition_variable_any seen_changed_;

@@ -21,6 +21,11 @@ constexpr double kLongestBlend_s = 0.8;
 constexpr double kBeforeContact_s = 0.1;
 constexpr double kDamping = 1e-3;  // of the pseudoinverse, m or rad
 constexpr double kSpares_m[] = {0.06, 0.03, 0.015, 0.008, 0.004};
+/// Ways back out are not looked at more finely than this: a bound of what any point of the robot
+/// moves from one to the next.
+constexpr double kFinestRetreat_m = 1e-3;
+/// The way back out may lag behind the path by so much.
+constexpr double kRetreatLag_s = 0.25;
 
 struct Smooth {
   double value = 0;
@@ -66,6 +71,50 @@ void AddJoints(const kinematics::Chain& chain, FollowedPath& path) {
     const Eigen::Matrix<double, 6, 6> inverse = square.inverse();
     path.joints_m.emplace_back((jacobian.transpose() * inverse).leftCols(3));
   }
+}
+
+void AddDepths(const kinematics::Chain& chain, const TargetPress& press, FollowedPath& path) {
+  path.depth_m.clear();
+  for (Eigen::Index i = 0; i < path.trajectory.positions.rows(); ++i) {
+    const geometry::Pose base_T_tool = chain.ToolPose(path.trajectory.positions.row(i).transpose());
+    path.depth_m.push_back(press.base_inward.dot(
+        base_T_tool.translation - path.base_p_object.row(i).transpose() - press.object_p_contact));
+  }
+}
+
+/// What a touch at the first place where one counts sends the tool back by, at each frame.
+std::vector<double> LargestRetreats(const FollowedPath& path, const TargetPress& press,
+                                    const GuardZone& zone) {
+  const std::vector<double>& time = path.trajectory.time_s;
+  std::vector<double> retreat_m(time.size(), 0.0);
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    if (time[i] < zone.begin_s) continue;
+    const double back = path.depth_m[i] - (press.first_depth_m - press.lift_m);
+    if (back <= 0 && time[i] > zone.deepest_s) break;
+    for (std::size_t k = i; k < time.size() && time[k] <= time[i] + kRetreatLag_s; ++k) {
+      retreat_m[k] = std::max(retreat_m[k], back);
+    }
+  }
+  return retreat_m;
+}
+
+/// The path with the tool led back out by so much.
+motion::JointTrajectory LedOut(const FollowedPath& path, const TargetPress& press,
+                               const std::vector<double>& retreat_m) {
+  motion::JointTrajectory out = path.trajectory;
+  const Eigen::Index n = out.positions.rows();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (retreat_m[k] == 0) continue;
+    out.positions.row(i) -= retreat_m[k] * (path.joints_m[k] * press.base_inward).transpose();
+  }
+  for (Eigen::Index i = 1; i + 1 < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (retreat_m[k - 1] == 0 && retreat_m[k + 1] == 0) continue;
+    out.velocities.row(i) = (out.positions.row(i + 1) - out.positions.row(i - 1)) /
+                            (out.time_s[k + 1] - out.time_s[k - 1]);
+  }
+  return out;
 }
 
 /// A path as the collision checker sees it.
@@ -132,7 +181,8 @@ double TargetTimes::begin_s() const { return contact_s - kShareFrom_s; }
 double TargetTimes::end_s() const { return release_s + kShareGone_s; }
 
 FollowedPath MakeFollowedPath(const kinematics::Chain& chain, motion::JointTrajectory trajectory,
-                              const TargetTimes& times, const TargetTrack& track, Duration start) {
+                              const TargetTimes& times, const TargetTrack& track, Duration start,
+                              const TargetPress* press) {
   FollowedPath path;
   path.trajectory = std::move(trajectory);
   const std::size_t frames = path.trajectory.time_s.size();
@@ -145,12 +195,13 @@ FollowedPath MakeFollowedPath(const kinematics::Chain& chain, motion::JointTraje
   }
   AddJoints(chain, path);
   AddAccelerations(path);
+  if (press != nullptr) AddDepths(chain, *press, path);
   return path;
 }
 
 FollowedPath Blend(const kinematics::Chain& chain, const FollowedPath& path,
                    const FollowedPath& fresh, const motion::JointTrajectory& first, double ahead_s,
-                   double begin_s, const TargetTimes& times) {
+                   double begin_s, const TargetTimes& times, const TargetPress* press) {
   const double end_s = first.duration_s();
   const double over_s = begin_s + std::clamp(times.contact_s - kBeforeContact_s - begin_s,
                                              kShortestBlend_s, kLongestBlend_s);
@@ -193,7 +244,25 @@ FollowedPath Blend(const kinematics::Chain& chain, const FollowedPath& path,
   }
   AddJoints(chain, out);
   AddAccelerations(out);
+  if (press != nullptr) AddDepths(chain, *press, out);
   return out;
+}
+
+std::optional<GuardZone> ZoneOf(const FollowedPath& path, const TargetPress& press,
+                                const TargetTimes& times) {
+  const std::vector<double>& time = path.trajectory.time_s;
+  std::size_t deepest = 0;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    if (time[i] < times.contact_s || time[i] > times.release_s + kShareAfter_s) continue;
+    if (deepest == 0 || path.depth_m[i] > path.depth_m[deepest]) deepest = i;
+  }
+  if (deepest == 0 || path.depth_m[deepest] <= press.first_depth_m) return std::nullopt;
+  std::size_t first = deepest;
+  while (first > 0 && path.depth_m[first - 1] >= press.first_depth_m) --first;
+  GuardZone zone;
+  zone.begin_s = time[first];
+  zone.deepest_s = time[deepest];
+  return zone;
 }
 
 bool KeepsLimits(const motion::JointTrajectory& trajectory,
@@ -215,36 +284,111 @@ bool KeepsLimits(const motion::JointTrajectory& trajectory,
   return true;
 }
 
-bool Prove(const kinematics::RobotDescription& robot, const collision::CollisionChecker& checker,
-           const motion::PlannedMotion& plan, double required_clearance_m, double begin_s,
-           const TargetTimes& times, FollowedPath& path) {
-  const double end_s = path.trajectory.duration_s();
-  std::vector<double> edges = {begin_s, end_s, times.begin_s(), times.end_s()};
-  for (const motion::TouchWindow& touch : plan.touches) {
-    edges.push_back(touch.begin_s);
-    edges.push_back(touch.end_s);
+namespace {
+
+/// Proves clearances along a followed path and along the ways that a touch may send it.
+class FollowedProof {
+ public:
+  FollowedProof(const kinematics::RobotDescription& robot,
+                const collision::CollisionChecker& checker, const motion::PlannedMotion& plan,
+                double begin_s, const FollowedPath& path, const TargetPress* press)
+      : robot_(robot),
+        checker_(checker),
+        plan_(plan),
+        begin_s_(begin_s),
+        path_(path),
+        press_(press) {}
+
+  /// Between two times, as planned.
+  bool Keeps(double required_m, double from_s, double to_s) const {
+    return Keeps(path_.trajectory, required_m, from_s, to_s);
   }
-  for (double& edge : edges) edge = std::clamp(edge, begin_s, end_s);
-  std::sort(edges.begin(), edges.end());
-  const Swept swept(robot, path.trajectory);
-  const auto proved = [&](double required_m, bool shared_only) {
+
+  /// False where the press does not come near its target.
+  bool FindWayOut(const TargetTimes& times) {
+    const std::optional<GuardZone> zone = ZoneOf(path_, *press_, times);
+    if (!zone) return false;
+    out_begin_s_ = zone->begin_s;
+    out_end_s_ = zone->begin_s;
+    retreat_m_ = LargestRetreats(path_, *press_, *zone);
+    const motion::JointTrajectory farthest = LedOut(path_, *press_, retreat_m_);
+    const Eigen::VectorXd levers = checker_.LongestLevers();
+    for (Eigen::Index i = 0; i < farthest.positions.rows(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (retreat_m_[k] > 0) out_end_s_ = path_.trajectory.time_s[k];
+      double moved_m = 0;
+      for (int j = 0; j < robot_.chain.dof(); ++j) {
+        moved_m += levers[robot_.chain.joint_indices()[j]] *
+                   std::abs(farthest.positions(i, j) - path_.trajectory.positions(i, j));
+      }
+      way_m_ = std::max(way_m_, moved_m);
+    }
+    return true;
+  }
+
+  /// Everywhere between these shares of the longest way out.
+  bool KeepsOut(double required_m, double from_share, double to_share) const {
+    const double middle = 0.5 * (from_share + to_share);
+    const double around_m = 0.5 * (to_share - from_share) * way_m_;
+    std::vector<double> retreat_m = retreat_m_;
+    for (double& back : retreat_m) back *= middle;
+    if (Keeps(LedOut(path_, *press_, retreat_m), required_m + around_m, out_begin_s_, out_end_s_)) {
+      return true;
+    }
+    if (around_m < kFinestRetreat_m) return false;
+    return KeepsOut(required_m, from_share, middle) && KeepsOut(required_m, middle, to_share);
+  }
+
+ private:
+  bool Keeps(const motion::JointTrajectory& along, double required_m, double from_s,
+             double to_s) const {
+    std::vector<double> edges = motion::AllowedEdges(plan_);
+    edges.push_back(from_s);
+    edges.push_back(to_s);
+    from_s = std::max(from_s, begin_s_);
+    to_s = std::max(to_s, begin_s_);
+    for (double& edge : edges) edge = std::clamp(edge, from_s, to_s);
+    std::sort(edges.begin(), edges.end());
+    const Swept swept(robot_, along);
     for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
       if (edges[i + 1] - edges[i] <= 0) continue;
       const double middle = 0.5 * (edges[i] + edges[i + 1]);
-      if (shared_only && (middle < times.begin_s() || middle > times.end_s())) continue;
-      std::vector<collision::AllowedTouch> allowed;
-      for (const motion::TouchWindow& touch : plan.touches) {
-        if (middle < touch.begin_s || middle > touch.end_s) continue;
-        for (const std::string& link : robot.touch_links) allowed.push_back({link, touch.object});
-      }
-      if (checker.FirstViolation(swept, edges[i], edges[i + 1], required_m, allowed)) return false;
+      const std::vector<collision::AllowedTouch> allowed =
+          motion::AllowedAt(plan_, robot_.touch_links, middle);
+      if (!checker_.KeepsClear(swept, edges[i], edges[i + 1], required_m, allowed)) return false;
     }
     return true;
-  };
-  if (!proved(required_clearance_m, false)) return false;
+  }
+
+  const kinematics::RobotDescription& robot_;
+  const collision::CollisionChecker& checker_;
+  const motion::PlannedMotion& plan_;
+  const double begin_s_;
+  const FollowedPath& path_;
+  const TargetPress* press_;
+  std::vector<double> retreat_m_;
+  double out_begin_s_ = 0;
+  double out_end_s_ = 0;
+  double way_m_ = 0;  ///< a bound of what any point of the robot moves by on the longest way out
+};
+
+}  // namespace
+
+bool Prove(const kinematics::RobotDescription& robot, const collision::CollisionChecker& checker,
+           const motion::PlannedMotion& plan, double required_clearance_m, double begin_s,
+           const TargetTimes& times, const TargetPress* press, FollowedPath& path) {
+  const double end_s = path.trajectory.duration_s();
+  FollowedProof proof(robot, checker, plan, begin_s, path, press);
+  if (!proof.Keeps(required_clearance_m, 0, end_s)) return false;
+  if (press != nullptr &&
+      !(proof.FindWayOut(times) && proof.KeepsOut(required_clearance_m, 0, 1))) {
+    return false;
+  }
   path.spare_m = 0;
   for (const double spare_m : kSpares_m) {
-    if (!proved(required_clearance_m + spare_m, true)) continue;
+    const double required_m = required_clearance_m + spare_m;
+    if (!proof.Keeps(required_m, times.begin_s(), std::min(times.end_s(), end_s))) continue;
+    if (press != nullptr && !proof.KeepsOut(required_m, 0, 1)) continue;
     path.spare_m = spare_m;
     break;
   }

@@ -14,6 +14,8 @@ constexpr double kApproach_m = 0.015;
 /// A press goes no deeper past its contact, and no further aside.
 constexpr double kDeepestPress_m = 0.015;
 constexpr double kWidestPress_m = 0.012;
+/// As deep as this less is at the deepest place.
+constexpr double kArrived_m = 3e-4;
 /// The guard's distance is gone within this before and after the deepest frame, at least.
 constexpr double kEase_s = 0.25;
 /// At which the tool slows down before the guard.
@@ -60,6 +62,10 @@ std::optional<Way> WayOf(const SkillMotion& motion, const Contact& contact) {
     if (aside > kWidestPress_m) return std::nullopt;
   }
   out.depth_m = depth(out.deepest);
+  // Where it stays down, it is there when it arrives.
+  const int arrived = out.deepest;
+  out.deepest = contact.first;
+  while (out.deepest < arrived && depth(out.deepest) < out.depth_m - kArrived_m) ++out.deepest;
   if (std::abs(out.depth_m) > kDeepestPress_m) return std::nullopt;
   // It leaves again, by at least the way by which its coming was told.
   for (int k = out.deepest; k < motion.frames(); ++k) {
@@ -68,21 +74,11 @@ std::optional<Way> WayOf(const SkillMotion& motion, const Contact& contact) {
   return std::nullopt;
 }
 
-/// What a button of the scene asks for beside.
-GuardOptions OptionsFor(const std::string& object, const scene::Description& scene,
-                        GuardOptions options) {
-  for (const scene::Button& button : scene.buttons) {
-    if (button.name != object) continue;
-    options.touch_n = std::max(options.touch_n, 2 * button.click_force_n);
-    options.distance_m += button.travel_m;
-  }
-  return options;
-}
-
 /// Moves the press to the guard's depth and slows its way in down.
 void Guard(SkillMotion& motion, const Contact& contact, const Way& way,
            const GuardOptions& options) {
   const double deeper = options.distance_m - way.depth_m;
+  const double speed_m_s = std::max(options.speed_m_s, options.distance_m / options.longest_s);
   const double deepest_s = Time(motion, way.deepest);
   const double begin_s = std::min(Time(motion, contact.first), deepest_s - kEase_s);
   const double end_s = std::max(Time(motion, contact.last), deepest_s + kEase_s);
@@ -108,8 +104,8 @@ void Guard(SkillMotion& motion, const Contact& contact, const Way& way,
     const bool inward = k <= way.deepest && to_go < 0.1 &&
                         (last - contact.base_p_contact).norm() < 0.1 + options.distance_m;
     if (inward) {
-      const double fastest = std::sqrt(options.speed_m_s * options.speed_m_s +
-                                       2 * kDeceleration_m_s2 * std::max(to_go, 0.0));
+      const double fastest =
+          std::sqrt(speed_m_s * speed_m_s + 2 * kDeceleration_m_s2 * std::max(to_go, 0.0));
       added_s += std::max(0.0, step_m / fastest - step_s);
     }
     motion.time_s[frame] += added_s;
@@ -118,14 +114,32 @@ void Guard(SkillMotion& motion, const Contact& contact, const Way& way,
 
 }  // namespace
 
+GuardOptions GuardFor(const std::string& object, const scene::Description& scene,
+                      GuardOptions options) {
+  for (const scene::Button& button : scene.buttons) {
+    if (button.name != object) continue;
+    options.touch_n = std::max(options.touch_n, 2 * button.click_force_n);
+    options.distance_m += button.travel_m;
+  }
+  return options;
+}
+
+std::optional<Eigen::Vector3d> PressDirection(const SkillMotion& motion, const Contact& contact) {
+  const std::optional<Way> way = WayOf(motion, contact);
+  if (!way) return std::nullopt;
+  return way->base_inward;
+}
+
 std::optional<SkillMotion> WithGuard(const SkillMotion& motion, const scene::Description& scene,
-                                     const GuardOptions& options) {
+                                     const GuardOptions& options, std::optional<std::size_t> only) {
   std::optional<SkillMotion> guarded;
-  for (const Contact& contact : motion.contacts) {
+  for (std::size_t i = 0; i < motion.contacts.size(); ++i) {
+    if (only && *only != i) continue;
+    const Contact& contact = motion.contacts[i];
     const std::optional<Way> way = WayOf(motion, contact);
     if (!way) continue;
     if (!guarded) guarded = motion;
-    Guard(*guarded, contact, *way, OptionsFor(contact.object, scene, options));
+    Guard(*guarded, contact, *way, GuardFor(contact.object, scene, options));
   }
   return guarded;
 }
@@ -148,7 +162,7 @@ std::vector<GuardZone> GuardZones(const motion::PlannedMotion& plan, const Skill
     const motion::ContactWindow& window = plan.contacts[i];
     GuardZone zone;
     zone.object = window.object;
-    const GuardOptions own = OptionsFor(zone.object, scene, options);
+    const GuardOptions own = GuardFor(zone.object, scene, options);
     zone.touch_n = own.touch_n;
     zone.distance_m = own.distance_m;
     zone.begin_s = window.begin_s;

@@ -2,6 +2,9 @@
 // Guarded contact: a press goes on a bounded way past the place where contact is expected, slowly,
 // and ends by touch.
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,14 +25,25 @@ struct GuardOptions {
   double distance_m = 0.010;
   double speed_m_s = 0.015;  ///< of the tool, from `before_m` before that place on
   double before_m = 0.003;
+  /// Where the target moves the guard's way past that place takes no longer: the speed is raised.
+  double longest_s = std::numeric_limits<double>::infinity();
 };
+
+/// With what a button of the scene asks for beside.
+GuardOptions GuardFor(const std::string& object, const scene::Description& scene,
+                      GuardOptions options);
+
+/// Where the tool goes in a press (unit vector, base frame); nullopt where the contact is none.
+std::optional<Eigen::Vector3d> PressDirection(const demonstration::SkillMotion& motion,
+                                              const demonstration::Contact& contact);
 
 /// The motion with each press going on by the guard's distance, slowed; nullopt where it has no
 /// press. A contact is a press where the tool comes, goes no deeper than a little past the contact
-/// and leaves the way it came; pushing along, or staying, is none.
+/// and leaves the way it came; pushing along, or staying, is none. `only`: this contact alone.
 std::optional<demonstration::SkillMotion> WithGuard(const demonstration::SkillMotion& motion,
                                                     const scene::Description& scene,
-                                                    const GuardOptions& options);
+                                                    const GuardOptions& options,
+                                                    std::optional<std::size_t> only = {});
 
 /// The press of a planned motion and where each place of its way in has its like on the way out.
 struct GuardZone {

@@ -73,15 +73,6 @@ Status Monitor::SetScene(collision::Scene scene) {
   return {};
 }
 
-std::vector<collision::AllowedTouch> Monitor::AllowedAt(double path_time_s, double later_s) const {
-  std::vector<collision::AllowedTouch> allowed;
-  for (const motion::TouchWindow& touch : plan_.touches) {
-    if (path_time_s < touch.begin_s || path_time_s > touch.end_s + later_s) continue;
-    for (const std::string& link : robot_.touch_links) allowed.push_back({link, touch.object});
-  }
-  return allowed;
-}
-
 void Monitor::OpenHandAsAt(double path_time_s) {
   if (plan_.trajectory.hand_open.empty()) return;
   kinematics::SetHandOpening(robot_.model, motion::EvaluateHand(plan_.trajectory, path_time_s),
@@ -165,7 +156,8 @@ std::optional<std::string> Monitor::LookAhead(const Measurement& measurement) {
   for (double t = measurement.path_time_s; t <= end_s; t += kLookStep_s) {
     motion::Evaluate(plan_.trajectory, t, ahead_, ahead_velocity_);
     OpenHandAsAt(t);
-    const collision::Clearance clearance = ClearanceOf(ahead_, AllowedAt(t, 0));
+    const collision::Clearance clearance =
+        ClearanceOf(ahead_, motion::AllowedAt(plan_, robot_.touch_links, t));
     if (clearance.distance_m >= limits_.clearance_m) continue;
     return "something moved into the way: " + FormatFixed(t - measurement.path_time_s, 2) +
            " s ahead " + Apart(clearance);
@@ -190,8 +182,8 @@ std::optional<std::string> Monitor::Observe(const Measurement& measurement) {
     tool_time_s_.push_back(measurement.elapsed_s);
   }
   OpenHandAsAt(measurement.path_time_s);
-  const collision::Clearance clearance =
-      ClearanceOf(joints, AllowedAt(measurement.path_time_s, kArrival_s));
+  const collision::Clearance clearance = ClearanceOf(
+      joints, motion::AllowedAt(plan_, robot_.touch_links, measurement.path_time_s, kArrival_s));
   smallest_clearance_m_ = std::min(smallest_clearance_m_, clearance.distance_m);
   NoteApproach(clearance, measurement.state.received);
 

@@ -77,7 +77,6 @@ class Monitor {
   const std::optional<std::string>& not_arrived() const { return not_arrived_; }
 
  private:
-  std::vector<collision::AllowedTouch> AllowedAt(double path_time_s, double later_s) const;
   void OpenHandAsAt(double path_time_s);
   collision::Clearance ClearanceOf(const Eigen::VectorXd& joints,
                                    const std::vector<collision::AllowedTouch>& allowed);

@@ -33,7 +33,12 @@ void MotionRun::FollowGuard(State state) {
     if (missed_.load(std::memory_order_relaxed) < 0) missed_.store(static_cast<int>(zone_));
     ++zone_;
   } else if (touch_n_.load(std::memory_order_relaxed) >= zone.touch_n) {
-    BeginSplice(zone.LeaveTime(now_s));
+    // What goes along with a moving target must stay on its time.
+    if (follower_ != nullptr) {
+      follower_->LiftOff(now_s);
+    } else {
+      BeginSplice(zone.LeaveTime(now_s));
+    }
     ++zone_;
   }
 }

@@ -38,6 +38,8 @@ class PathFollower {
   virtual void Correct(double path_time_s, double rate, double elapsed_s,
                        Eigen::Ref<Eigen::VectorXd> position,
                        Eigen::Ref<Eigen::VectorXd> velocity) = 0;
+  /// The press at this place of the path met its touch: it is to lift off. Of the control loop.
+  virtual void LiftOff(double path_time_s) = 0;
   /// What is wrong, if anything.
   virtual std::optional<std::string> Problem() const = 0;
 };

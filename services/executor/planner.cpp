@@ -114,7 +114,6 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
   }
   Result<demonstration::SkillMotion> motion = skills_.Query(request.skill, request.version, query);
   if (!motion.ok()) return motion.error();
-  if (chase != nullptr) chase->adjust(*motion);
 
   // What is seen stands where it is seen, but what was asked for stands where it was asked for.
   std::vector<geometry::NamedPose> placed;
@@ -125,53 +124,101 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
   Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
       robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
   if (!checker.ok()) return checker.error();
-  Result<Planned> planned = PlanGuarded(*motion, *std::move(checker), *measured, start,
-                                        request.speed, chase == nullptr, stop);
+  Result<Planned> planned =
+      PlanGuarded(*motion, *std::move(checker), *measured, start, request.speed, chase, stop);
   if (!planned.ok()) return planned;
   planned->objects = used;
   planned->placed = std::move(placed);
   return planned;
 }
 
+std::optional<demonstration::SkillMotion> Planner::Guarded(const demonstration::SkillMotion& motion,
+                                                           const Chase* chase) const {
+  if (chase == nullptr) return WithGuard(motion, scene_, options_.guard);
+  GuardOptions options = options_.guard;
+  options.longest_s = chase->guard_longest_s;
+  for (std::size_t i = 0; i < motion.contacts.size(); ++i) {
+    if (motion.contacts[i].object != chase->target) continue;
+    return WithGuard(motion, scene_, options, i);
+  }
+  return std::nullopt;
+}
+
+Status Planner::TakeCarries(const demonstration::SkillMotion& motion, const Chase* chase,
+                            collision::CollisionChecker& checker,
+                            std::vector<motion::Carry>& carries) const {
+  if (chase != nullptr) return {};  // what moves has no place that it is taken from
+  std::vector<std::string> movable;
+  for (const scene::Object& object : scene_.objects) {
+    if (!object.fixed) movable.push_back(object.name);
+  }
+  auto found = motion::FindCarries(motion, checker.scene(), movable, robot_.chain.tip_link(),
+                                   robot_.touch_links);
+  if (!found.ok()) return found.error();
+  carries = *std::move(found);
+  collision::Scene scene = checker.scene();
+  motion::AddCarries(carries, scene);
+  return checker.SetScene(std::move(scene));
+}
+
 Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
                                      collision::CollisionChecker checker,
                                      const MeasuredState& measured, const Eigen::VectorXd& start,
-                                     double speed, bool guard, const std::stop_token& stop) const {
+                                     double speed, const Chase* chase,
+                                     const std::stop_token& stop) const {
   motion::PlanOptions options = options_.plan;
   options.speed_scale = speed;
   const auto [closed, open] = std::minmax_element(motion.hand_open.begin(), motion.hand_open.end());
-  if (!motion.hand_open.empty() && *open - *closed > kGrasp) {
+  const bool grasps = !motion.hand_open.empty() && *open - *closed > kGrasp;
+  if (grasps) {
     options.touch_margin_m = std::max(options.touch_margin_m, kGraspMargin_m);
-    guard = false;  // what it goes to is taken, not pressed
+    if (const Status known = TakeCarries(motion, chase, checker, options.carries); !known.ok()) {
+      return known.error();
+    }
   }
+  // What a hand goes to is taken, not pressed.
+  const bool may_guard = !grasps && options_.guard.touch_n > 0 && measured.feels_touch &&
+                         (chase == nullptr || chase->guarded.value_or(true));
   std::vector<std::string> warnings = motion.warnings;
   std::vector<GuardZone> zones;
   Result<motion::PlannedMotion> planned = FailedPrecondition("not planned");
   std::optional<demonstration::SkillMotion> guarded;
-  if (guard && options_.guard.touch_n > 0 && measured.feels_touch) {
-    guarded = WithGuard(motion, scene_, options_.guard);
-  }
+  if (may_guard) guarded = Guarded(motion, chase);
   if (guarded) {
+    if (chase != nullptr) chase->adjust(*guarded, true);
     planned =
         motion::PlanMotion(*guarded, robot_.model, robot_.chain, checker, start, options, stop);
-    if (planned.ok()) {
+    if (planned.ok() && chase == nullptr) {
       zones = GuardZones(*planned, motion, robot_.chain, scene_, options_.guard);
-    } else {
+    } else if (!planned.ok()) {
       warnings.push_back("pressed by position, not until touch: " + planned.error().message);
+      guarded.reset();
     }
   }
-  if (!planned.ok()) {
-    planned = motion::PlanMotion(motion, robot_.model, robot_.chain, checker, start, options, stop);
+  if (!guarded) {
+    if (chase != nullptr && chase->guarded.value_or(false)) return planned.error();
+    demonstration::SkillMotion by_position = motion;
+    if (chase != nullptr) chase->adjust(by_position, false);
+    planned =
+        motion::PlanMotion(by_position, robot_.model, robot_.chain, checker, start, options, stop);
   }
   if (!planned.ok()) return planned.error();
   const std::vector<std::string>& more = planned->report.warnings;
   warnings.insert(warnings.end(), more.begin(), more.end());
-  return Planned{*std::move(planned), std::move(checker), {}, {}, std::move(zones),
-                 std::move(warnings), motion.frames()};
+  return Planned{*std::move(planned),
+                 std::move(checker),
+                 {},
+                 {},
+                 std::move(zones),
+                 std::move(options.carries),
+                 std::move(warnings),
+                 motion.frames(),
+                 guarded.has_value()};
 }
 
 std::optional<collision::Scene> Planner::MovedScene(
-    const std::vector<geometry::NamedPose>& fixed, std::vector<geometry::NamedPose>& placed) const {
+    const std::vector<geometry::NamedPose>& fixed, const std::vector<motion::Carry>& carries,
+    std::vector<geometry::NamedPose>& placed) const {
   const auto named = [](const std::string& name) {
     return [&name](const geometry::NamedPose& pose) { return pose.name == name; };
   };
@@ -193,7 +240,9 @@ std::optional<collision::Scene> Planner::MovedScene(
     moved = true;
   }
   if (!moved) return std::nullopt;
-  return collision::MakeScene(scene_, placed);
+  collision::Scene scene = collision::MakeScene(scene_, placed);
+  motion::AddCarries(carries, scene);
+  return scene;
 }
 
 Status Planner::CheckStart(const motion::PlannedMotion& plan) const {

@@ -2,6 +2,7 @@
 // From a request to a checked motion: asks the skill, places what is seen, plans.
 
 #include <functional>
+#include <limits>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -39,15 +40,21 @@ struct Planned {
   std::vector<geometry::NamedPose> objects;  ///< what the skill was asked for
   std::vector<geometry::NamedPose> placed;   ///< where everything was taken to be, those last
   std::vector<GuardZone> zones;
+  std::vector<motion::Carry> carries;  ///< what the hand takes on the way
   std::vector<std::string> warnings;
   int frames = 0;
+  bool guarded = false;  ///< its presses, or those with the target that is chased, end by touch
 };
 
 /// Of a plan that follows a moving target.
 struct Chase {
-  /// Changes what the skill answered before it is planned. Presses then end by position.
-  std::function<void(demonstration::SkillMotion&)> adjust;
+  std::string target = {};
+  /// Changes what the skill answered before it is planned; `guarded`: its first press of the target
+  /// goes on until touch. Other presses end by position.
+  std::function<void(demonstration::SkillMotion& motion, bool guarded)> adjust;
   std::optional<Eigen::VectorXd> start;  ///< from where; else as ever
+  std::optional<bool> guarded = {};      ///< so and not otherwise; absent: where there is room
+  double guard_longest_s = std::numeric_limits<double>::infinity();  ///< as GuardOptions
 };
 
 api::PlanSummary Summarise(const Planned& planned);
@@ -65,15 +72,17 @@ class Planner {
                        const Chase* chase = nullptr) const;
 
   const PlannerOptions& options() const { return options_; }
+  const scene::Description& scene() const { return scene_; }
   /// What the skill is about. Errors as the skill service's.
   Result<std::string> TargetOf(const api::ExecuteRequest& request) const;
 
   /// Refuses a motion whose first point the robot is not near, or of which nobody knows.
   Status CheckStart(const motion::PlannedMotion& plan) const;
 
-  /// The scene as it is seen now, where something but `fixed` moved away from `placed`, which is
-  /// brought up to date.
+  /// The scene as it is seen now, with what is carried, where something but `fixed` moved away from
+  /// `placed`, which is brought up to date.
   std::optional<collision::Scene> MovedScene(const std::vector<geometry::NamedPose>& fixed,
+                                             const std::vector<motion::Carry>& carries,
                                              std::vector<geometry::NamedPose>& placed) const;
 
  private:
@@ -82,8 +91,14 @@ class Planner {
   /// Guarded where there is a press, a touch sensor and room for it.
   Result<Planned> PlanGuarded(const demonstration::SkillMotion& motion,
                               collision::CollisionChecker checker, const MeasuredState& measured,
-                              const Eigen::VectorXd& start, double speed, bool guard,
+                              const Eigen::VectorXd& start, double speed, const Chase* chase,
                               const std::stop_token& stop) const;
+  /// What the motion carries, whose bodies the checker gets to know.
+  Status TakeCarries(const demonstration::SkillMotion& motion, const Chase* chase,
+                     collision::CollisionChecker& checker,
+                     std::vector<motion::Carry>& carries) const;
+  std::optional<demonstration::SkillMotion> Guarded(const demonstration::SkillMotion& motion,
+                                                    const Chase* chase) const;
   Result<std::vector<geometry::NamedPose>> ObjectsFor(const api::ExecuteRequest& request) const;
 
   const Clock& clock_;

@@ -25,6 +25,8 @@ void Teleoperation::WatchLoop(const std::stop_token& stop) {
       const std::lock_guard lock(watch_mutex_);
       Drain();
     }
+    watched_.store(seen);
+    host_.on_settled();
     if (due == told) continue;
     told = due;
     beat_.fetch_add(1);
@@ -130,7 +132,7 @@ void Teleoperation::WatchMeasured() {
 }
 
 void Teleoperation::FollowScene() {
-  if (std::optional<collision::Scene> moved = planner_.MovedScene({}, placed_)) {
+  if (std::optional<collision::Scene> moved = planner_.MovedScene({}, {}, placed_)) {
     moved_ = std::move(moved);
     const Status set = watch_->SetScene(*moved_);
     if (!set.ok()) log_.Warning("an object's place is not used", {{"why", set.error().message}});

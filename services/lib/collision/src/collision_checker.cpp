@@ -103,11 +103,18 @@ void CollisionChecker::Impl::Place(const Eigen::Ref<const Eigen::VectorXd>& q,
 
 bool CollisionChecker::Impl::IsAllowed(const Pair& pair,
                                        const std::vector<AllowedTouch>& allowed) const {
-  if (!pair.scene) return false;
-  const std::string& link = robot_parts[pair.first].name;
+  const std::string& first = robot_parts[pair.first].name;
+  if (!pair.scene) {
+    if (static_cast<std::size_t>(pair.second) < model_parts) return false;
+    const std::string& held = robot_parts[pair.second].name;
+    return std::any_of(allowed.begin(), allowed.end(), [&](const AllowedTouch& touch) {
+      return touch.object.empty() && (touch.link == held || touch.link == first);
+    });
+  }
   const std::string& object = scene_parts[pair.second].name;
   return std::any_of(allowed.begin(), allowed.end(), [&](const AllowedTouch& touch) {
-    return touch.link == link && touch.object == object;
+    return (touch.link.empty() || touch.link == first) &&
+           (touch.object.empty() || touch.object == object);
   });
 }
 

@@ -1,4 +1,7 @@
+#include <algorithm>
+
 #include "exemplar/collision/scene.hpp"
+#include "pairs.hpp"
 
 namespace exemplar::collision {
 
@@ -39,6 +42,24 @@ Scene MakeScene(const scene::Description& description,
     scene.held.push_back({held.name, held.link, held.link_T_shape, held.shape, held.touch_links});
   }
   return scene;
+}
+
+Result<std::vector<Clearance>> Neighbours(const Scene& scene, const std::string& object,
+                                          double within_m) {
+  const Result<std::vector<ScenePart>> parts = MakeSceneParts(scene);
+  if (!parts.ok()) return parts.error();
+  const auto found = std::find_if(parts->begin(), parts->end(),
+                                  [&](const ScenePart& part) { return part.name == object; });
+  if (found == parts->end()) return NotFound("the scene has no object \"" + object + "\"");
+  std::vector<Clearance> neighbours;
+  for (const ScenePart& other : *parts) {
+    if (&other == &*found) continue;
+    const Separation apart =
+        Distance(found->body, found->base_at, other.body, other.base_at, within_m);
+    if (apart.distance_m >= within_m) continue;
+    neighbours.push_back({object, other.name, apart.distance_m, apart.p_first, apart.p_second});
+  }
+  return neighbours;
 }
 
 CheckerOptions OptionsOf(const kinematics::RobotDescription& robot) {

@@ -42,8 +42,10 @@ Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinemat
                               const collision::CollisionChecker& checker,
                               const Eigen::Ref<const Eigen::VectorXd>& start,
                               const Eigen::Ref<const Eigen::VectorXd>& goal,
-                              const std::vector<collision::AllowedTouch>& touches,
+                              std::vector<collision::AllowedTouch> touches,
+                              const std::vector<collision::AllowedTouch>& ignored,
                               const PlanOptions& options) {
+  touches.insert(touches.end(), ignored.begin(), ignored.end());
   if ((start - goal).cwiseAbs().maxCoeff() < kThere_rad) return Approach{};
   const auto time = [&](const Way& way, std::size_t first, std::size_t last) {
     JointTrajectory all;
@@ -61,7 +63,7 @@ Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinemat
   };
   const Eigen::VectorXd all_joints = kinematics::FullJointVector(model, chain, start);
   const bool touching =
-      checker.SmallestClearance(all_joints).distance_m < options.required_clearance_m &&
+      checker.SmallestClearance(all_joints, ignored).distance_m < options.required_clearance_m &&
       checker.SmallestClearance(all_joints, touches).distance_m >= options.required_clearance_m;
 
   std::vector<Way> ways;
@@ -78,19 +80,19 @@ Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinemat
     }
   }
   const JointTrajectory straight = time({start, goal}, 0, 1);
-  const std::optional<collision::Violation> in_the_way = first_violation(straight, {});
+  const std::optional<collision::Violation> in_the_way = first_violation(straight, ignored);
   if (!in_the_way) return Approach{straight, 0};
   for (const Way& way : ways) {
     const std::size_t end = way.size() - 1;
     if (!touching) {
       JointTrajectory trajectory = time(way, 0, end);
-      if (!first_violation(trajectory, {})) return Approach{trajectory, 0};
+      if (!first_violation(trajectory, ignored)) return Approach{trajectory, 0};
       continue;
     }
     // The first leg leads out of the touch; from its end on nothing is touched any more.
     const JointTrajectory rise = time(way, 0, 1);
     const JointTrajectory rest = time(way, 1, end);
-    if (!first_violation(rise, touches) && !first_violation(rest, {})) {
+    if (!first_violation(rise, touches) && !first_violation(rest, ignored)) {
       return Approach{Concatenate(rise, rest), rise.duration_s()};
     }
   }

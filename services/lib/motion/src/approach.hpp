@@ -15,12 +15,14 @@ struct Approach {
 
 /// A collision-free way from rest to rest in joint space: straight, else over one or two raised
 /// postures. Where the robot begins in a touch of `touches` (the last press), it first rises from
-/// it. Empty when `start` is `goal`. kFailedPrecondition says what is in the way.
+/// it. What `ignored` allows is never looked at. Empty when `start` is `goal`. kFailedPrecondition
+/// says what is in the way.
 Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinematics::Chain& chain,
                               const collision::CollisionChecker& checker,
                               const Eigen::Ref<const Eigen::VectorXd>& start,
                               const Eigen::Ref<const Eigen::VectorXd>& goal,
-                              const std::vector<collision::AllowedTouch>& touches,
+                              std::vector<collision::AllowedTouch> touches,
+                              const std::vector<collision::AllowedTouch>& ignored,
                               const PlanOptions& options);
 
 }  // namespace exemplar::motion

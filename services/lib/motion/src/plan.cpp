@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "approach.hpp"
@@ -12,6 +13,7 @@
 #include "exemplar/kinematics/robot_description.hpp"
 #include "timing.hpp"
 #include "trajectory.hpp"
+#include "windows.hpp"
 
 namespace exemplar::motion {
 namespace {
@@ -293,34 +295,6 @@ Status VerifyPath(const SkillMotion& motion, const kinematics::Chain& chain,
   return VerifyBetween(motion, chain, path, solution, options);
 }
 
-/// A stretch of a trajectory with its own permissions.
-struct Stretch {
-  double begin_s = 0;
-  double end_s = 0;
-  std::vector<collision::AllowedTouch> allowed;
-};
-
-/// From before to after a contact, until the tool is `margin_m` away from where it was at the
-/// contact's ends.
-std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
-                                     const kinematics::Chain& chain, double begin_s, double end_s,
-                                     double margin_m) {
-  Eigen::VectorXd q(chain.dof());
-  Eigen::VectorXd velocity(chain.dof());
-  const auto tool_at = [&](double t) {
-    Evaluate(trajectory, t, q, velocity);
-    return chain.ToolPose(q).translation;
-  };
-  const std::vector<double>& time = trajectory.time_s;
-  const Eigen::Vector3d at_begin = tool_at(begin_s);
-  auto first = std::upper_bound(time.begin(), time.end(), begin_s) - 1;
-  while (first != time.begin() && (tool_at(*first) - at_begin).norm() <= margin_m) --first;
-  const Eigen::Vector3d at_end = tool_at(end_s);
-  auto last = std::lower_bound(time.begin(), time.end() - 1, end_s);
-  while (last + 1 != time.end() && (tool_at(*last) - at_end).norm() <= margin_m) ++last;
-  return {*first, *last};
-}
-
 /// The opening that the skill has at each frame, taken to the trajectory's times.
 void AddHand(const SkillMotion& motion, const std::vector<double>& frame_time_s,
              JointTrajectory& trajectory) {
@@ -332,67 +306,6 @@ void AddHand(const SkillMotion& motion, const std::vector<double>& frame_time_s,
         std::clamp((t - frame_time_s[k]) / (frame_time_s[k + 1] - frame_time_s[k]), 0.0, 1.0);
     trajectory.hand_open.push_back(motion.hand_open[k] +
                                    r * (motion.hand_open[k + 1] - motion.hand_open[k]));
-  }
-}
-
-void AddContacts(const SkillMotion& motion, const kinematics::Chain& chain,
-                 const PlanOptions& options, const std::vector<double>& frame_time_s,
-                 double offset_s, PlannedMotion& plan) {
-  for (const demonstration::Contact& contact : motion.contacts) {
-    const ContactWindow window{contact.object, offset_s + frame_time_s[contact.first],
-                               offset_s + frame_time_s[contact.last], contact.base_p_contact};
-    const auto [begin_s, end_s] =
-        TouchTimes(plan.trajectory, chain, window.begin_s, window.end_s, options.touch_margin_m);
-    plan.touches.push_back({contact.object, std::max(offset_s, begin_s), end_s});
-    plan.contacts.push_back(window);
-  }
-}
-
-std::vector<Stretch> MakeStretches(const PlannedMotion& plan,
-                                   const std::vector<std::string>& touch_links) {
-  std::vector<double> edges = {0, plan.trajectory.duration_s()};
-  for (const TouchWindow& touch : plan.touches) {
-    edges.push_back(touch.begin_s);
-    edges.push_back(touch.end_s);
-  }
-  std::sort(edges.begin(), edges.end());
-  std::vector<Stretch> stretches;
-  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
-    if (edges[i + 1] - edges[i] <= 0) continue;
-    Stretch stretch{edges[i], edges[i + 1], {}};
-    const double middle = 0.5 * (edges[i] + edges[i + 1]);
-    for (const TouchWindow& touch : plan.touches) {
-      if (middle < touch.begin_s || middle > touch.end_s) continue;
-      for (const std::string& link : touch_links) stretch.allowed.push_back({link, touch.object});
-    }
-    stretches.push_back(std::move(stretch));
-  }
-  return stretches;
-}
-
-void MeasureClearance(const JointTrajectory& trajectory, const kinematics::RobotModel& model,
-                      const kinematics::Chain& chain, const collision::CollisionChecker& checker,
-                      const std::vector<Stretch>& stretches, PlanReport& report) {
-  report.smallest_clearance.distance_m = std::numeric_limits<double>::infinity();
-  Eigen::VectorXd q = kinematics::FullJointVector(model, chain, trajectory.positions.row(0));
-  const std::vector<collision::AllowedTouch> none;
-  for (std::size_t i = 0; i < trajectory.time_s.size(); ++i) {
-    const double t = trajectory.time_s[i];
-    const auto stretch = std::find_if(stretches.begin(), stretches.end(), [&](const Stretch& s) {
-      return t >= s.begin_s && t <= s.end_s;
-    });
-    for (int j = 0; j < chain.dof(); ++j) {
-      q[chain.joint_indices()[j]] = trajectory.positions(static_cast<Eigen::Index>(i), j);
-    }
-    if (!trajectory.hand_open.empty()) {
-      kinematics::SetHandOpening(model, trajectory.hand_open[i], q);
-    }
-    const collision::Clearance clearance =
-        checker.SmallestClearance(q, stretch == stretches.end() ? none : stretch->allowed);
-    if (clearance.distance_m < report.smallest_clearance.distance_m) {
-      report.smallest_clearance = clearance;
-      report.smallest_clearance_time_s = t;
-    }
   }
 }
 
@@ -452,8 +365,9 @@ class Planner {
     for (const demonstration::Contact& contact : motion_.contacts) {
       for (const std::string& link : touch_links) touches.push_back({link, contact.object});
     }
-    Result<Approach> approach = PlanApproach(model_, chain_, checker_, start_,
-                                             skill.positions.row(0).transpose(), touches, options_);
+    Result<Approach> approach =
+        PlanApproach(model_, chain_, checker_, start_, skill.positions.row(0).transpose(), touches,
+                     NotYet(options_.carries), options_);
     if (!approach.ok()) return approach.error();
     const double offset = approach->trajectory.duration_s();
     plan.trajectory = Concatenate(approach->trajectory, skill);
@@ -467,6 +381,7 @@ class Planner {
       }
     }
     AddContacts(motion_, chain_, options_, frame_time_s, offset, plan);
+    AddCarryWindows(motion_, chain_, options_, frame_time_s, offset, plan);
     const std::vector<Stretch> stretches = MakeStretches(plan, touch_links);
     const TrajectoryPath swept(plan.trajectory, model_, chain_);
     for (const Stretch& stretch : stretches) {
@@ -492,21 +407,47 @@ class Planner {
     const std::vector<geometry::Pose>& path = prepared_.path.base_T_tool;
     FrameTouches touches(path.size());
     for (const demonstration::Contact& contact : motion_.contacts) {
-      const auto near = [&](int frame, int end) {
-        return (path[frame].translation - path[end].translation).norm() <= options_.touch_margin_m;
+      const auto near = [&](int frame) {
+        const Eigen::Vector3d& tool = path[frame].translation;
+        return std::min((tool - path[contact.first].translation).norm(),
+                        (tool - path[contact.last].translation).norm()) <= options_.touch_margin_m;
       };
       int first = contact.first;
-      while (first > 0 && near(first - 1, contact.first)) --first;
+      while (first > 0 && near(first - 1)) --first;
       int last = contact.last;
-      while (last + 1 < motion_.frames() && near(last + 1, contact.last)) ++last;
+      while (last + 1 < motion_.frames() && near(last + 1)) ++last;
       for (int k = first; k <= last; ++k) {
         for (const std::string& link : TouchLinks()) touches[k].push_back({link, contact.object});
       }
     }
+    for (const Carry& carry : options_.carries) AddByFrame(carry, touches);
     return touches;
   }
 
  private:
+  /// As AllowedAt, by the frames of the skill's motion.
+  void AddByFrame(const Carry& carry, FrameTouches& touches) const {
+    const std::vector<geometry::Pose>& path = prepared_.path.base_T_tool;
+    const auto apart = [&](int frame, int other) {
+      return (path[frame].translation - path[other].translation).norm();
+    };
+    for (int k = 0; k < motion_.frames(); ++k) {
+      std::vector<collision::AllowedTouch>& allowed = touches[k];
+      if (k < carry.last) allowed.push_back({"", carry.laid.name});
+      if (k < carry.first || k >= carry.last) allowed.push_back({carry.held.name, ""});
+      if (k >= carry.first) allowed.push_back({"", carry.object});
+      if (apart(k, carry.first) <= kLiftedMargin_m) {
+        for (const std::string& object : carry.from) allowed.push_back({carry.held.name, object});
+      }
+      if (carry.last == motion_.frames()) continue;
+      if (apart(k, carry.last) <= kLiftedMargin_m) {
+        for (const std::string& object : carry.to) allowed.push_back({carry.held.name, object});
+      }
+      if (apart(k, carry.last) > options_.touch_margin_m) continue;
+      for (const std::string& link : TouchLinks()) allowed.push_back({link, carry.laid.name});
+    }
+  }
+
   std::vector<std::string> TouchLinks() const {
     if (!options_.touch_links.empty()) return options_.touch_links;
     return {chain_.tip_link()};

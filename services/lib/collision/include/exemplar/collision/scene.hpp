@@ -63,10 +63,16 @@ struct Clearance {
   Eigen::Vector3d base_p_second = Eigen::Vector3d::Zero();
 };
 
+/// The objects and clouds that are nearer than `within_m` to this object of the scene, as it
+/// stands; Clearance::first is the object. Errors as CollisionChecker::SetScene's, and where there
+/// is none.
+Result<std::vector<Clearance>> Neighbours(const Scene& scene, const std::string& object,
+                                          double within_m);
+
 /// A link may touch an object (the button that is to be pressed).
 struct AllowedTouch {
-  std::string link;  ///< or a held object
-  std::string object;
+  std::string link;    ///< or a held object; empty: all of them
+  std::string object;  ///< empty: everything, other links too where `link` is a held object
 };
 
 struct CheckerOptions {

@@ -12,6 +12,7 @@
 #include "exemplar/collision/scene.hpp"
 #include "exemplar/demonstration/motion.hpp"
 #include "exemplar/kinematics/chain.hpp"
+#include "exemplar/motion/carry.hpp"
 #include "exemplar/motion/path_ik.hpp"
 
 namespace exemplar::motion {
@@ -54,6 +55,8 @@ struct PlanOptions {
   PathIkVariant inverse_kinematics = PathIkVariant::kExemplar;
   double demonstrated_weight = 1.0;  ///< pull to the demonstrated joints, 0: none
   int max_branches = 6;              ///< ways of standing that are tried before the plan is refused
+  /// What the hand carries on the way, as FindCarries says; the checker knows their bodies.
+  std::vector<Carry> carries = {};
 };
 
 /// Figures of a plan, for people and for the demo's last line.
@@ -87,13 +90,33 @@ struct TouchWindow {
   double end_s = 0;
 };
 
+/// When each body of a Carry counts.
+struct CarryWindow {
+  std::string object, held, laid;
+  std::vector<std::string> from, to;
+  double begin_s = 0;    ///< the hand closes
+  double lifted_s = 0;   ///< from here on it is away from where it stood
+  double lowered_s = 0;  ///< from here on it is near to where it is laid
+  double end_s = 0;      ///< the hand opens
+  double left_s = 0;     ///< from here on the touch links are away from it
+};
+
 struct PlannedMotion {
   JointTrajectory trajectory;
   std::vector<ContactWindow> contacts;
   std::vector<TouchWindow> touches;
+  std::vector<CarryWindow> carries = {};
   std::vector<double> frame_time_s = {};  ///< when each frame of the skill's motion is reached
   PlanReport report = {};
 };
+
+/// Who may touch what at a time of the plan, `later_s` after windows end still; bodies that do not
+/// count at that time may be touched by all.
+std::vector<collision::AllowedTouch> AllowedAt(const PlannedMotion& plan,
+                                               const std::vector<std::string>& touch_links,
+                                               double time_s, double later_s = 0);
+/// The times at which that changes, in any order.
+std::vector<double> AllowedEdges(const PlannedMotion& plan);
 
 /// IK along the whole motion, collision checks at and between frames, timing within limits.
 /// `start` (chain.dof() values): where the robot is. Refusals are kFailedPrecondition and say when,
