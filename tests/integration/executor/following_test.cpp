@@ -1,10 +1,15 @@
+#include "executor/following.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "allocation_count.hpp"
 #include "executor/following_path.hpp"
 #include "executor/following_target.hpp"
+#include "executor/motion_run.hpp"
 #include "exemplar/base/rng.hpp"
+#include "robot_rig.hpp"
 
 namespace exemplar::executor {
 namespace {
@@ -92,6 +97,101 @@ TEST(TargetTimes, BelongToTheTargetAroundTheTouchOnly) {
     EXPECT_GE(times.ShareAt(t), 0);
     EXPECT_LE(times.ShareAt(t), 1);
     EXPECT_LT(std::abs(times.ShareAt(t + 0.01) - times.ShareAt(t)), 0.03) << t;
+  }
+}
+
+/// A robot that is where it is told to be, and a target that moves on its own.
+TEST(Following, LeadsAndLiftsOffWithoutAStepOrAnAllocation) {
+  constexpr Duration kPeriod = std::chrono::milliseconds(8);
+  const kinematics::RobotDescription robot = *kinematics::ReadRobotDescription(
+      std::filesystem::path(EXEMPLAR_SOURCE_DIR) / "deploy" / "models" / "arm7");
+  scene::Description scene;
+  scene::Button button;
+  button.name = "target";
+  button.base_T_object.translation = test::kTarget;
+  scene.buttons.push_back(button);
+  ManualClock clock;
+  test::GateLog log;
+  test::PressSkill skills;
+  RobotView view(robot.chain.joint_names());
+  TargetTracks tracks;
+  PlannerOptions options;
+  options.plan.touch_links = robot.touch_links;
+  options.plan.comfortable = robot.home;
+  options.guard.touch_n = 8;
+  const Planner planner(clock, skills, robot, scene, view, options);
+  const FollowingPlanner following_planner(clock, planner, tracks, robot, {});
+  Rng rng(3);
+  const auto see = [&] {
+    ircp::JointStateSample state;
+    state.names = robot.chain.joint_names();
+    state.positions.assign(robot.home.data(), robot.home.data() + robot.home.size());
+    state.touch_n = {0};
+    view.Take(state, clock.Steady());
+    geometry::Pose pose = geometry::Pose::FromTranslation(test::kTarget);
+    pose.translation.y() += 0.1 * ToSeconds(clock.Steady()) + rng.Normal(0, kNoise_m);
+    tracks.Add("target", clock.Steady(), pose, kNoise_m);
+  };
+  for (int cycle = 0; cycle < 120; ++cycle) {
+    clock.Advance(kPeriod);
+    see();
+  }
+  api::ExecuteRequest request;
+  request.skill = "press";
+  Result<FollowingPlan> plan = following_planner.Plan(request, std::nullopt, {});
+  ASSERT_TRUE(plan.ok()) << plan.error().message;
+  ASSERT_EQ(plan->planned.zones.size(), 1U);
+  const GuardZone zone = plan->planned.zones[0];
+  EXPECT_LT(zone.begin_s, plan->times.contact_s);
+  EXPECT_GT(zone.deepest_s, plan->times.contact_s);
+  while (clock.Steady() < plan->start) {
+    clock.Advance(kPeriod);
+    see();
+  }
+  Following following(clock, log, following_planner, robot, request, *plan, plan->planned.motion);
+  MotionRun run(robot, plan->planned.motion, std::move(plan->planned.checker), {}, {zone});
+  run.SetFollower(&following);
+  const double touched_s = 0.5 * (plan->times.contact_s + zone.deepest_s);
+  int allocated = 0;
+  double largest_jump = 0;
+  double touch_height_m = 0;
+  double after_touch_s = 0;
+  double highest_m = 0;
+  Eigen::VectorXd before = robot.home;
+  Eigen::VectorXd speed_before = Eigen::VectorXd::Zero(robot.chain.dof());
+  for (int cycle = 0; cycle < 2000 && !run.finished(); ++cycle) {
+    {
+      const test::AllocationCount allocations;
+      (void)run.Tick(ToSeconds(kPeriod), State::kExecuting, 1);
+      allocated += allocations.count();
+    }
+    const Eigen::VectorXd q = run.commanded();
+    const Eigen::VectorXd v = (q - before) / ToSeconds(kPeriod);
+    largest_jump = std::max(largest_jump, (v - speed_before).cwiseAbs().maxCoeff());
+    before = q;
+    speed_before = v;
+    const double height_m = robot.chain.ToolPose(q).translation.z();
+    if (run.path_time_s() > touched_s) {
+      if (touch_height_m == 0) touch_height_m = height_m;
+      after_touch_s += ToSeconds(kPeriod);
+      if (after_touch_s < 0.35) highest_m = std::max(highest_m, height_m);
+      MeasuredState felt;
+      felt.joints = q;
+      felt.touch_n = 9;
+      run.Measure(felt);
+    }
+    clock.Advance(kPeriod);
+    see();
+    following.Take("target");
+    if (cycle % 31 == 30) following.PlanOnce({});
+  }
+  EXPECT_TRUE(run.finished());
+  EXPECT_FALSE(following.Problem().has_value());
+  EXPECT_EQ(run.missed(), nullptr);
+  EXPECT_GT(highest_m, touch_height_m + 0.004) << "it lifts off at once";
+  EXPECT_LT(largest_jump, 0.15) << "rad/s from one cycle to the next";
+  if (test::AllocationCount::Works()) {
+    EXPECT_EQ(allocated, 0);
   }
 }
 
