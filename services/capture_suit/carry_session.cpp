@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "capture_suit/places.hpp"
+#include "capture_suit/session_parts.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/ircp/simulated_time.hpp"
 
@@ -14,7 +15,6 @@ namespace {
 constexpr const char* kSource = "suit";
 constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
-constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
 constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
 constexpr double kWayToStart = 1.0;                                     // s
 /// The object is held this much above its middle, so that the fingertips stay off the table.
@@ -49,11 +49,6 @@ double HalfHeight(const kinematics::Shape& shape) {
 }
 
 Error Cancelled() { return {ErrorCode::kCancelled, "stopped before the last trial had ended"}; }
-
-std::string PlaceText(const geometry::Pose& pose) {
-  return "(" + FormatFixed(pose.translation.x(), 2) + ", " + FormatFixed(pose.translation.y(), 2) +
-         ")";
-}
 
 }  // namespace
 
@@ -120,20 +115,14 @@ Result<std::unique_ptr<CarrySession>> CarrySession::Create(
   auto glove = bus.MakeWriter<ircp::EndEffectorSample>(kSource);
   if (!glove) return glove.error();
   session->glove_ = std::move(*glove);
-  if (options.record) {
-    Result<RecorderRemote> recorder =
-        RecorderRemote::Create(bus, clock, options.person.seed, options.demonstrator);
-    if (!recorder) return recorder.error();
-    session->recorder_ = std::move(*recorder);
-  }
-  auto control = ircp::ControlServer::Create(
-      bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
-        return {false, "\"" + command.action + "\" is no action of this program", {}};
-      });
+  auto recorder =
+      MakeRecorder(options.record, bus, clock, options.person.seed, options.demonstrator);
+  if (!recorder) return recorder.error();
+  session->recorder_ = std::move(*recorder);
+  const CarrySession* counted = session.get();
+  auto control = MakeControl(bus, clock, [counted] { return counted->sent(); });
   if (!control) return control.error();
   session->control_ = std::move(*control);
-  const CarrySession* counted = session.get();
-  session->control_->SetSentCounts([counted] { return counted->sent(); });
   return session;
 }
 
@@ -163,28 +152,12 @@ Status CarrySession::Run(std::stop_token stop) {
   return {};
 }
 
-Status CarrySession::Put(const std::string& object, const geometry::Pose& base_T_object,
-                         const std::stop_token& stop) {
-  const Eigen::Vector3d& p = base_T_object.translation;
-  const Eigen::Quaterniond& q = base_T_object.rotation;
-  const Result<ircp::Answer> answer = simulator_->Call("place",
-                                                       {{"object", object},
-                                                        {"x", FormatDouble(p.x())},
-                                                        {"y", FormatDouble(p.y())},
-                                                        {"z", FormatDouble(p.z())},
-                                                        {"qx", FormatDouble(q.x())},
-                                                        {"qy", FormatDouble(q.y())},
-                                                        {"qz", FormatDouble(q.z())},
-                                                        {"qw", FormatDouble(q.w())}},
-                                                       kAnswerTimeout, stop);
-  if (answer) return {};
-  return WithPlace(answer.error(), "putting \"" + object + "\" at " + PlaceText(base_T_object));
-}
-
 Status CarrySession::Perform(std::size_t index, const std::stop_token& stop) {
   const Places& places = places_[index];
-  if (Status status = Put(to_.name, places.base_T_to, stop); !status) return status;
-  if (Status status = Put(from_.name, places.base_T_from, stop); !status) return status;
+  if (Status status = PutObject(*simulator_, to_.name, places.base_T_to, stop); !status)
+    return status;
+  if (Status status = PutObject(*simulator_, from_.name, places.base_T_from, stop); !status)
+    return status;
   reaching::Target take;
   take.name = from_.name;
   take.base_T_object = places.base_T_from;

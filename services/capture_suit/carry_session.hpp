@@ -54,8 +54,6 @@ class CarrySession final : public Session {
                std::vector<Places> places, reaching::Person person,
                const CarrySessionOptions& options);
 
-  Status Put(const std::string& object, const geometry::Pose& base_T_object,
-             const std::stop_token& stop);
   Status Perform(std::size_t index, const std::stop_token& stop);
   Status MoveTo(const Eigen::VectorXd& goal, double seconds, const std::stop_token& stop);
   Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture, double open);

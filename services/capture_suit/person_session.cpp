@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "capture_suit/places.hpp"
+#include "capture_suit/session_parts.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/ircp/simulated_time.hpp"
 
@@ -14,7 +15,6 @@ namespace {
 constexpr const char* kSource = "suit";
 constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
-constexpr Duration kAnswerTimeout = std::chrono::seconds(10);
 constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
 constexpr double kWayToStart = 1.0;                                     // s
 constexpr double kBeyondTravel = 0.003;  // m, as one presses who wants to feel the stop
@@ -31,11 +31,6 @@ Result<scene::Button> FindButton(const scene::Description& scene, const std::str
   return NotFound(
       "the scene has no button \"" + name + '"' + (near ? "; did you mean \"" + *near + "\"?" : ""),
       "object");
-}
-
-std::string PlaceText(const geometry::Pose& pose) {
-  return "(" + FormatFixed(pose.translation.x(), 2) + ", " + FormatFixed(pose.translation.y(), 2) +
-         ")";
 }
 
 Error Cancelled() { return {ErrorCode::kCancelled, "stopped before the last trial had ended"}; }
@@ -81,36 +76,32 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
   auto suit = bus.MakeWriter<ircp::SuitSample>(kSource);
   if (!suit) return suit.error();
   session->suit_ = std::move(*suit);
-  if (options.record) {
-    Result<RecorderRemote> recorder =
-        RecorderRemote::Create(bus, clock, options.person.seed, options.demonstrator);
-    if (!recorder) return recorder.error();
-    session->recorder_ = std::move(*recorder);
-  }
+  auto recorder =
+      MakeRecorder(options.record, bus, clock, options.person.seed, options.demonstrator);
+  if (!recorder) return recorder.error();
+  session->recorder_ = std::move(*recorder);
   if (options.dead_man) {
     Result<std::unique_ptr<DeadMan>> dead_man = DeadMan::Create(bus, clock);
     if (!dead_man) return dead_man.error();
     session->dead_man_ = std::move(*dead_man);
   }
-  auto control = ircp::ControlServer::Create(
-      bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
-        return {false, "\"" + command.action + "\" is no action of this program", {}};
-      });
+  const PersonSession* counted = session.get();
+  auto control = MakeControl(bus, clock, [counted] { return counted->sent(); });
   if (!control) return control.error();
   session->control_ = std::move(*control);
-  const PersonSession* counted = session.get();
-  session->control_->SetSentCounts([counted] { return counted->sent(); });
   return session;
 }
 
 Status PersonSession::Run(std::stop_token stop) {
-  if (suit_) {
-    WaitForReaders(stop);
-    if (Status status = Send(posture_); !status) return status;
-  }
+  if (suit_) WaitForReaders(stop);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (stop.stop_requested()) return Cancelled();
-    if (Status status = PlaceButton(places_[i], stop); !status) return status;
+    if (Status status = PutObject(*simulator_, button_.name, places_[i], stop); !status)
+      return status;
+    // Where simulated time stands until the suit moves, the first sample has it go on.
+    if (i == 0 && suit_) {
+      if (Status status = Send(posture_); !status) return status;
+    }
     if (options_.place_only) {
       log_.Info("button at " + PlaceText(places_[i]));
     } else if (Status status = Perform(i, stop); !status) {
@@ -124,25 +115,6 @@ Status PersonSession::Run(std::stop_token stop) {
                  {{"topic", ircp::SuitSample::kTopic}});
   }
   control_->SetState("done", std::to_string(places_.size()) + " trials performed");
-  return {};
-}
-
-Status PersonSession::PlaceButton(const geometry::Pose& base_T_button,
-                                  const std::stop_token& stop) {
-  const Eigen::Vector3d& p = base_T_button.translation;
-  const Eigen::Quaterniond& q = base_T_button.rotation;
-  const Result<ircp::Answer> answer = simulator_->Call("place",
-                                                       {{"object", button_.name},
-                                                        {"x", FormatDouble(p.x())},
-                                                        {"y", FormatDouble(p.y())},
-                                                        {"z", FormatDouble(p.z())},
-                                                        {"qx", FormatDouble(q.x())},
-                                                        {"qy", FormatDouble(q.y())},
-                                                        {"qz", FormatDouble(q.z())},
-                                                        {"qw", FormatDouble(q.w())}},
-                                                       kAnswerTimeout, stop);
-  if (!answer)
-    return WithPlace(answer.error(), "placing the button at " + PlaceText(base_T_button));
   return {};
 }
 

@@ -53,7 +53,6 @@ class PersonSession final : public Session {
                 std::vector<geometry::Pose> places, reaching::Person person,
                 const PersonSessionOptions& options);
 
-  Status PlaceButton(const geometry::Pose& base_T_button, const std::stop_token& stop);
   Status Perform(std::size_t index, std::stop_token stop);
   /// Sends a smooth way from where the suit is to `goal`.
   Status MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop);

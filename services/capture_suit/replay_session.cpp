@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "capture_suit/session_parts.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/demonstration/csv.hpp"
 #include "exemplar/ircp/simulated_time.hpp"
@@ -51,25 +52,18 @@ Result<std::unique_ptr<ReplaySession>> ReplaySession::Create(
   if (!streams) return streams.error();
   std::unique_ptr<ReplaySession> session(
       new ReplaySession(clock, log, std::move(trials), std::move(*streams), options));
-  if (options.record) {
-    Result<RecorderRemote> recorder =
-        RecorderRemote::Create(bus, clock, options.seed, options.demonstrator);
-    if (!recorder) return recorder.error();
-    session->recorder_ = std::move(*recorder);
-  }
+  auto recorder = MakeRecorder(options.record, bus, clock, options.seed, options.demonstrator);
+  if (!recorder) return recorder.error();
+  session->recorder_ = std::move(*recorder);
   if (options.dead_man) {
     Result<std::unique_ptr<DeadMan>> dead_man = DeadMan::Create(bus, clock);
     if (!dead_man) return dead_man.error();
     session->dead_man_ = std::move(*dead_man);
   }
-  auto control = ircp::ControlServer::Create(
-      bus, clock, "capture_suit", [](const ircp::CommandSample& command) -> ircp::Answer {
-        return {false, "\"" + command.action + "\" is no action of this program", {}};
-      });
+  const ReplaySession* counted = session.get();
+  auto control = MakeControl(bus, clock, [counted] { return counted->sent(); });
   if (!control) return control.error();
   session->control_ = std::move(*control);
-  const ReplaySession* counted = session.get();
-  session->control_->SetSentCounts([counted] { return counted->sent(); });
   return session;
 }
 
