@@ -25,9 +25,14 @@ CACHE = pathlib.Path(os.environ.get("EXEMPLAR_DOCKER", ROOT / "build" / "docker"
 UNITS = ["recorder", "learning", "executor", "capture-tactile", "capture-vision", "simulator", "gateway"]
 IMAGE = "exemplar/installed-packages:test"
 NAME = "exemplar-packages"
+SYSTEMD = "exemplar-systemd"
+# systemd as the first process of a container: the little of cgroups that it may have there, it must be able to write.
+BOOT = "mount -o remount,rw /sys/fs/cgroup; for each in /sys/fs/cgroup/*; do mount -o remount,rw $each; done 2>/dev/null; exec /lib/systemd/systemd"
 
 
 class PackageTest(unittest.TestCase):
+    installed = False
+
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-packages-"))
@@ -70,24 +75,74 @@ class PackageTest(unittest.TestCase):
         complaints = [line for line in done.stderr.splitlines() if re.search(r"exemplar-\S+\.service:\d+:|Unknown|not executable", line)]
         self.assertEqual(complaints, [])
 
-    def test_installed_services_start_as_their_units_say_and_answer_a_query(self):
+    @classmethod
+    def install(cls):
+        """Makes the image of a Debian on which the packages are installed, once."""
+        if cls.installed:
+            return
         with Engine(CACHE, alone=False) as docker:
             run(ROOT / "deploy" / "docker" / "base-image", "--folder", CACHE, env=docker.environment, timeout=600)
-            subprocess.run(["docker", "rm", "-f", NAME], env=docker.environment, capture_output=True, check=False)
-            install = "apt-get update -q && DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /packages/exemplar-*.deb"
-            base = ["docker", "run", "--name", NAME, "--volume", f"{self.folder}:/packages"]
+            for old in (("rm", "-f", NAME), ("image", "rm", "-f", IMAGE)):
+                subprocess.run(["docker", *old], env=docker.environment, capture_output=True, check=False)
+            packages = "systemd /packages/exemplar-*.deb"
+            script = f"apt-get update -q && DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends {packages}"
             begin = time.monotonic()
-            run(*base, "--network", "host", "debian:bookworm-slim", "sh", "-c", install, env=docker.environment, timeout=900)
+            words = ["docker", "run", "--name", NAME, "--volume", f"{cls.folder}:/packages", "--network", "host"]
+            run(*words, "debian:bookworm-slim", "sh", "-c", script, env=docker.environment, timeout=900)
             print(f"installed by apt: {time.monotonic() - begin:.0f} s", file=sys.stderr)
             docker.docker("commit", NAME, IMAGE)
             docker.docker("rm", NAME)
+        cls.installed = True
+
+    def test_installed_services_start_as_their_units_say_and_answer_a_query(self):
+        self.install()
         with Engine(CACHE, alone=True) as docker:
-            run(*base, "--detach", "--network", "none", IMAGE, "sleep", "infinity", env=docker.environment)
+            words = ["docker", "run", "--name", NAME, "--volume", f"{self.folder}:/packages", "--detach", "--network", "none"]
+            run(*words, IMAGE, "sleep", "infinity", env=docker.environment)
             try:
                 self.start_all(docker)
             finally:
                 docker.docker("rm", "-f", NAME)
-                docker.docker("image", "rm", "-f", IMAGE)
+
+    def test_systemd_starts_the_units_and_starts_again_who_dies_or_hangs(self):
+        self.install()
+        with Engine(CACHE, alone=True) as docker:
+            words = ["docker", "run", "--name", SYSTEMD, "--detach", "--network", "none", "--cgroupns", "private", "--cap-add", "SYS_ADMIN"]
+            words += [f"--security-opt={option}=unconfined" for option in ("seccomp", "apparmor", "systempaths")]
+            words += ["--tmpfs", "/run", "--tmpfs", "/run/lock", "--tmpfs", "/tmp:exec", "--env", "container=docker", IMAGE, "sh", "-c", BOOT]
+            try:
+                run(*words, env=docker.environment)
+                wait_for(lambda: self.says(docker, "is-system-running") in ("running", "degraded"), "systemd to be up", 60)
+            except AssertionError as reason:
+                self.skipTest(f"systemd does not run in a container here: {reason}")
+            try:
+                self.supervise(docker)
+            finally:
+                docker.docker("rm", "-f", SYSTEMD)
+
+    def supervise(self, docker):
+        names = [f"exemplar-{unit}" for unit in UNITS]
+        for name in names:
+            started = subprocess.run(["docker", "exec", SYSTEMD, "systemctl", "start", name], env=docker.environment, capture_output=True, text=True, check=False)
+            self.assertEqual(self.says(docker, "is-active", name), "active", started.stderr + self.says(docker, "status", "--no-pager", "--lines=20", name))
+        for name, signal in (("exemplar-recorder", "KILL"), ("exemplar-learning", "STOP")):
+            first = self.says(docker, "show", "--property=MainPID", "--value", name)
+            begin = time.monotonic()
+            docker.docker("exec", SYSTEMD, "systemctl", "kill", "--kill-whom=main", f"--signal=SIG{signal}", name)
+            well = lambda: self.says(docker, "is-active", name) == "active" and self.says(docker, "show", "--property=MainPID", "--value", name) != first
+            wait_for(well, f"systemd to start {name} again", 90)
+            print(f"SIG{signal} to {name}: runs again after {time.monotonic() - begin:.1f} s", file=sys.stderr)
+            self.assertEqual(self.says(docker, "show", "--property=NRestarts", "--value", name), "1")
+        begin = time.monotonic()
+        docker.docker("exec", SYSTEMD, "systemctl", "stop", *names)
+        results = {name: self.says(docker, "show", "--property=Result", "--value", name) for name in names}
+        print(f"stopped in {time.monotonic() - begin:.1f} s", file=sys.stderr)
+        self.assertEqual(set(results.values()), {"success"}, results)
+
+    @staticmethod
+    def says(docker, *words):
+        done = subprocess.run(["docker", "exec", SYSTEMD, "systemctl", *words], env=docker.environment, capture_output=True, text=True, check=False)
+        return (done.stdout or done.stderr).strip()
 
     def start_all(self, docker):
         running = {}
