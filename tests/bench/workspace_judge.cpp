@@ -12,6 +12,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -145,11 +146,7 @@ struct Judged {
   int clear = 0;    ///< of these, clear of everything
 };
 
-}  // namespace
-}  // namespace exemplar
-
-int main(int argc, char** argv) {
-  using namespace exemplar;
+int Judge(int argc, char** argv) {
   constexpr const char* kName = "workspace_judge";
   std::string robot_folder;
   std::string scene_file;
@@ -197,4 +194,16 @@ int main(int argc, char** argv) {
   }
   std::cout << verdicts << '\n';
   return 0;
+}
+
+}  // namespace
+}  // namespace exemplar
+
+int main(int argc, char** argv) {
+  try {
+    return exemplar::Judge(argc, argv);
+  } catch (const std::exception& failure) {
+    std::cerr << "workspace_judge: " << failure.what() << '\n';
+    return 1;
+  }
 }

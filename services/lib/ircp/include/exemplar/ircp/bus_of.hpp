@@ -15,6 +15,7 @@ namespace exemplar::ircp {
 template <class Derived, class Base = Bus>
 class BusOf : public Base {
  public:
+// NOLINTBEGIN(bugprone-macro-parentheses): a type cannot stand in parentheses
 #define EXEMPLAR_IRCP_PORT(Sample)                                                               \
   Result<std::unique_ptr<Writer<Sample>>> DoMakeWriter(                                          \
       std::type_identity<Sample>, const std::string& topic, const std::string& source) final {   \
@@ -37,6 +38,7 @@ class BusOf : public Base {
   EXEMPLAR_IRCP_PORT(SafetySample)
   EXEMPLAR_IRCP_PORT(ClockSample)
 #undef EXEMPLAR_IRCP_PORT
+  // NOLINTEND(bugprone-macro-parentheses)
 };
 
 }  // namespace exemplar::ircp
