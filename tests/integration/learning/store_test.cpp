@@ -129,6 +129,10 @@ TEST_F(StoreTest, BringsAStoreOfTheFirstSchemaUpToDateAndKeepsAllOfIt) {
     EXPECT_EQ(store->ListSkills()->at(0).version, 2);
     EXPECT_EQ(store->ListVersions("press")->at(1).trial_ids, std::vector<std::string>{"trial-1"});
     EXPECT_EQ(*store->NextVersion("press"), 8);
+    // Whose trial it is nobody said before the third schema.
+    EXPECT_EQ(store->ListTrials("", "")->at(0).person, time == 0 ? "" : "user03");
+    EXPECT_TRUE(*store->SetPerson("trial-1", "user03"));
+    EXPECT_FALSE(*store->SetPerson("trial-2", "user03"));
   }
 }
 
