@@ -196,8 +196,8 @@ Status Secure(const ParticipantOptions& options, dds::DomainParticipantQos& qos)
   return {};
 }
 
-/// Ends the program when somebody else is revoked: whoever starts it again, does so with the list as
-/// it then is. Null for an open participant.
+/// Ends the program when somebody else is revoked: whoever starts it again, does so with the list
+/// as it then is. Null for an open participant.
 std::shared_ptr<RevocationWatch> WatchRevocations(const ParticipantOptions& options) {
   if (options.security.empty()) return nullptr;
   return std::make_shared<RevocationWatch>(RevocationWatch::Options{
