@@ -6,7 +6,7 @@ namespace exemplar::capture_suit {
 namespace {
 
 constexpr const char* kSource = "suit-dead-man";
-constexpr Duration kPeriod = std::chrono::milliseconds(50);
+constexpr Duration kPeriod = std::chrono::milliseconds(20);
 constexpr Duration kReleasedFor = std::chrono::milliseconds(500);
 /// Without an answer to a press for so long it is pressed anew: whoever had to hear it may not have
 /// been there yet.
@@ -27,8 +27,7 @@ Result<std::unique_ptr<DeadMan>> DeadMan::Create(ircp::Bus& bus, const Clock& cl
       [dead_man](const ircp::StatusSample& status, const ircp::Reception&) {
         const bool on = status.state == "teleoperating";
         // One from before the press says nothing of it.
-        dead_man->followed_.store(dead_man->held_.load() && on &&
-                                  status.detail.starts_with("following"));
+        dead_man->followed_.store(dead_man->held() && on && status.detail.starts_with("following"));
         if (on && !status.detail.starts_with("holding")) dead_man->answered_.store(true);
       });
   if (!reader.ok()) return reader.error();
@@ -41,6 +40,7 @@ DeadMan::~DeadMan() {
   thread_.request_stop();
   if (thread_.joinable()) thread_.join();
   Set(false);
+  Write(false);
 }
 
 void DeadMan::BeginToPress() {
@@ -52,14 +52,31 @@ void DeadMan::BeginToPress() {
 
 void DeadMan::GoOnPressing() {
   const Duration now = clock_.Steady();
-  if (now < turn_at_ || (held_.load() && answered_.load())) return;
-  const bool press = !held_.load();
+  if (now < turn_at_ || (held() && answered_.load())) return;
+  const bool press = !held();
   Set(press);
   turn_at_ = now + (press ? kPressedFor : kReleasedFor);
 }
 
 void DeadMan::Set(bool held) {
-  held_.store(held);
+  const std::lock_guard lock(mutex_);
+  const Duration now = clock_.Steady();
+  if (now > turned_) held_before_ = held_;
+  turned_ = now;
+  held_ = held;
+}
+
+bool DeadMan::held() const {
+  const std::lock_guard lock(mutex_);
+  return held_;
+}
+
+bool DeadMan::HeldUntilNow() const {
+  const std::lock_guard lock(mutex_);
+  return clock_.Steady() > turned_ ? held_ : held_before_;
+}
+
+void DeadMan::Write(bool held) {
   ircp::SafetySample sample;
   sample.dead_man_held = held;
   (void)writer_->Write(sample);  // the next one follows
@@ -67,7 +84,7 @@ void DeadMan::Set(bool held) {
 
 void DeadMan::Run(const std::stop_token& stop) {
   do {
-    Set(held_.load());
+    Write(HeldUntilNow());
   } while (clock_.SleepFor(kPeriod, stop));
 }
 

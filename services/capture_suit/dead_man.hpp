@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -12,7 +13,9 @@
 
 namespace exemplar::capture_suit {
 
-/// Says 20 times a second whether the switch is held; it is released at first, and when this goes.
+/// Says 50 times a second whether the switch is held; it is released at first, and when this goes.
+/// One thread says it, and what is done at a moment it says after that moment, so that in simulated
+/// time no order of threads decides what is sent.
 /// Thread-safe.
 class DeadMan {
  public:
@@ -31,11 +34,17 @@ class DeadMan {
  private:
   DeadMan(const Clock& clock, std::unique_ptr<ircp::Writer<ircp::SafetySample>> writer);
   void Set(bool held);
+  bool held() const;
+  bool HeldUntilNow() const;  ///< before what was done at this very moment
+  void Write(bool held);
   void Run(const std::stop_token& stop);
 
   const Clock& clock_;
   std::unique_ptr<ircp::Writer<ircp::SafetySample>> writer_;
-  std::atomic<bool> held_{false};
+  mutable std::mutex mutex_;
+  bool held_ = false;
+  bool held_before_ = false;  ///< until turned_
+  Duration turned_{-1};
   std::atomic<bool> followed_{false};
   std::atomic<bool> answered_{false};  ///< the robot followed, or came to it, since BeginToPress
   Duration turn_at_{0};                ///< of the press or release that comes next

@@ -222,7 +222,9 @@ TEST_F(DataTest, AnErasureDuringLearningIsFinishedByTheNext) {
   EXPECT_EQ(trials().List("", "ann")->size(), 0u);
   // What was being learned holds ann's trials: it is found as well.
   ASSERT_TRUE(data().Erase({.person = "ann"}, {}, {}).ok());
-  for (const api::VersionInfo& version : *skills().Versions("press")) {
+  const auto versions = skills().Versions("press");
+  ASSERT_TRUE(versions.ok());
+  for (const api::VersionInfo& version : *versions) {
     EXPECT_EQ(version.trial_ids.size(), 3u);
   }
   EXPECT_THAT(Persons(), ElementsAre("ben"));
