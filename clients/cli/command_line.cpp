@@ -81,10 +81,15 @@ std::string Unknown(const CLI::App* app, const std::string& word) {
   return text;
 }
 
+/// The words that nobody took: a command's own, or those that it left to the commands above it.
+std::vector<std::string> Remaining(const CLI::App* root) {
+  std::vector<std::string> remaining = Deepest(root)->remaining();
+  return remaining.empty() ? root->remaining(true) : remaining;
+}
+
 std::string Explain(const CLI::App* root, const CLI::ParseError& error) {
   const CLI::App* app = Deepest(root);
-  std::vector<std::string> remaining = app->remaining();
-  if (remaining.empty()) remaining = root->remaining(true);
+  const std::vector<std::string> remaining = Remaining(root);
   const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
                        error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
   if (unknown && !remaining.empty()) return Unknown(app, remaining.front());
@@ -282,7 +287,7 @@ int CommandLine::Run(int argc, char** argv) {
     app_->parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     const CLI::App* app = Deepest(app_.get());
-    const std::vector<std::string> unknown = app->remaining();
+    const std::vector<std::string> unknown = Remaining(app_.get());
     // --help and --version; of a command that there is.
     const bool mistyped = !unknown.empty() && !app->get_subcommands({}).empty();
     if (error.get_exit_code() == 0 && !mistyped) return app_->exit(error);
