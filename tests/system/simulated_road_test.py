@@ -93,7 +93,10 @@ class SimulatedRoadTest(unittest.TestCase):
             with self.subTest(f"{name} {topic}"):
                 self.assertGreater(len(ours[topic]), least)
                 self.assertEqual(len(ours[topic]), len(theirs[topic]))
-                differing = [pair for pair in zip(ours[topic], theirs[topic]) if pair[0] != pair[1]]
+                # The very first message may be taken in a period later (docs/simulator.md): there all but its reception counts.
+                one, other = (rows[0][:2] + rows[0][3:] for rows in (ours[topic], theirs[topic]))
+                self.assertEqual(one, other)
+                differing = [pair for pair in zip(ours[topic][1:], theirs[topic][1:]) if pair[0] != pair[1]]
                 self.assertEqual(differing[:1], [], f"{len(differing)} of {len(ours[topic])} messages")
                 print(f"{name} {topic}: {len(ours[topic])} messages, equal to the last bit")
 
