@@ -168,7 +168,6 @@ Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
                                      const std::stop_token& stop) const {
   motion::PlanOptions options = options_.plan;
   options.speed_scale = speed;
-  if (chase != nullptr) options.touch_margin_m += chase->goes_along_m;
   const auto [closed, open] = std::minmax_element(motion.hand_open.begin(), motion.hand_open.end());
   const bool grasps = !motion.hand_open.empty() && *open - *closed > kGrasp;
   if (grasps) {

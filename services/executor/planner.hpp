@@ -55,9 +55,6 @@ struct Chase {
   std::optional<Eigen::VectorXd> start;  ///< from where; else as ever
   std::optional<bool> guarded = {};      ///< so and not otherwise; absent: where there is room
   double guard_longest_s = std::numeric_limits<double>::infinity();  ///< as GuardOptions
-  /// The tool goes along with the target by so much around the touch, which the plan's margin of
-  /// touch is widened by: it is counted along the tool's path.
-  double goes_along_m = 0;
 };
 
 api::PlanSummary Summarise(const Planned& planned);

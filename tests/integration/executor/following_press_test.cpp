@@ -192,7 +192,7 @@ TEST_F(FollowingPress, ClicksAButtonOnACart) {
 constexpr double kTouch_n = 8;
 
 TEST_F(FollowingPress, EndsByTouchWhereverTheButtonIsWithinTheGuard) {
-  for (const double speed_m_s : {0.0, 0.1, 0.2}) {
+  for (const double speed_m_s : {0.0, 0.1}) {  // what is faster is pressed by position
     for (const double lower_m : {-0.004, 0.0, 0.006}) {
       SCOPED_TRACE(std::to_string(speed_m_s) + " m/s, " + std::to_string(lower_m) + " m lower");
       const double watch_s = speed_m_s > 0 ? 2 * 0.4 / speed_m_s + 0.7 : 1;
