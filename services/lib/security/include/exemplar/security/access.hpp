@@ -63,8 +63,8 @@ std::string ToYaml(const AccessList& list);
 Status WriteAccessList(const std::filesystem::path& file, const AccessList& list);
 Result<AccessList> ReadAccessList(const std::filesystem::path& file);
 
-/// Who shows `who`. Errors (kUnauthenticated; kPermissionDenied for who may not speak for others) say
-/// what is missing, and nothing of the file.
+/// Who shows `who`. Errors (kUnauthenticated; kPermissionDenied for who may not speak for others)
+/// say what is missing, and nothing of the file.
 Result<Caller> Identify(const AccessList& list, const Presented& who, Stamp now);
 
 /// The file, read again when it changes. What can no longer be read leaves the old entries in
