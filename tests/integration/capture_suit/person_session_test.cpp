@@ -112,8 +112,7 @@ TEST(PersonSession, EndsWhenTheSimulatorRefusesThePlace) {
   station.refuse = "place";
   const Status status = Perform(station, {.places = "0.4,-0.1"});
   ASSERT_FALSE(status.ok());
-  EXPECT_THAT(status.error().message,
-              HasSubstr("at (0.40, -0.10): I will not place"));
+  EXPECT_THAT(status.error().message, HasSubstr("at (0.40, -0.10): I will not place"));
   EXPECT_TRUE(station.suit.empty());
 }
 
