@@ -127,9 +127,8 @@ class RecorderTest(unittest.TestCase):
 
     def test_a_replay_is_recorded_as_the_original_was(self):
         _, server = self.programs.recorder()
-        capture = self.replay("--rate", "2")
         exemplar("record", "start", "--name", "original", "--topic", TOPIC, "--server", server)
-        capture.wait(30)
+        self.replay("--rate", "2").wait(30)
         exemplar("record", "stop", "--server", server)
         original = self.folder / "data" / "original.mcap"
         exemplar("record", "start", "--name", "again", "--server", server)
