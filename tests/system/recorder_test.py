@@ -127,7 +127,7 @@ class RecorderTest(unittest.TestCase):
 
     def test_a_replay_is_recorded_as_the_original_was(self):
         _, server = self.programs.recorder()
-        exemplar("record", "start", "--name", "original", "--topic", TOPIC, "--server", server)
+        exemplar("record", "start", "--name", "original", "--server", server)
         self.replay("--rate", "2").wait(30)
         exemplar("record", "stop", "--server", server)
         original = self.folder / "data" / "original.mcap"
