@@ -52,13 +52,13 @@ class Programs:
 def exemplar(*words, prefix=()):
     """Runs the command line; its answer in JSON."""
     command = [*prefix, BINARIES / "exemplar", *words, "--format", "json"]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=120)
     if done.returncode != 0:
         raise AssertionError(f"{words}: exit {done.returncode}: {done.stderr}")
     return json.loads(done.stdout)
 
 
-def wait_for(condition, what, limit_s=20):
+def wait_for(condition, what, limit_s=60):
     deadline = time.monotonic() + limit_s
     while not condition():
         if time.monotonic() > deadline:

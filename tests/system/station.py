@@ -11,9 +11,18 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def metric(address, name):
-    """The value of one of a program's metrics that has no labels."""
-    with urllib.request.urlopen(f"http://{address}/metrics", timeout=5) as answer:
-        lines = answer.read().decode().splitlines()
+    """The value of one of a program's metrics that has no labels, once it is served."""
+    lines = []
+
+    def served():
+        try:
+            with urllib.request.urlopen(f"http://{address}/metrics", timeout=30) as answer:
+                lines[:] = answer.read().decode().splitlines()
+        except OSError:
+            return False
+        return True
+
+    wait_for(served, f"the metrics at {address}")
     return float(next(line.split()[1] for line in lines if line.startswith(name + " ")))
 
 
