@@ -43,7 +43,9 @@ int main(int argc, char** argv) {
   const auto metrics =
       program::ServeMetrics(options.common(), capture_tactile::MetricsOf(**session));
   if (!metrics) return program::Fail(kName, metrics.error());
+  station_clock->SetSettled([&session] { return (*session)->is_settled(); });
   station_clock->Begin(ircp::NetworkClock::Caller::kSleeps, *log, signals.token());
   (*session)->Run(signals.token());
+  station_clock->SetSettled(nullptr);
   return 0;
 }

@@ -76,6 +76,7 @@ class RobotTouch final : public Session {
     return {{ircp::TactileSample::kTopic, "tactile", writer_->sent()}};
   }
   const ircp::Reader& reader() const override { return *reader_; }
+  bool is_settled() const override { return has_heard_ || reader_->matched_writers() > 0; }
 
  private:
   struct Touch {
@@ -85,6 +86,7 @@ class RobotTouch final : public Session {
 
   /// On a thread of the network.
   void Take(const ircp::JointStateSample& state) {
+    has_heard_ = true;
     if (state.touch_sensors.empty()) return;
     Touch touch;
     touch.sample.header.stamp = state.header.stamp;
@@ -100,6 +102,7 @@ class RobotTouch final : public Session {
   const SessionOptions options_;
   std::mutex mutex_;
   std::optional<Touch> newest_;
+  std::atomic<bool> has_heard_ = false;
   std::atomic<std::uint64_t> polls_ = 0;
   std::atomic<std::uint64_t> stale_ = 0;
   std::unique_ptr<ircp::Writer<ircp::TactileSample>> writer_;

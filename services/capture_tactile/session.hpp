@@ -37,6 +37,10 @@ class Session {
   virtual std::uint64_t stale() const = 0;
   virtual std::vector<ircp::TopicCount> sent() const = 0;
   virtual const ircp::Reader& reader() const = 0;
+
+  /// Whether the robot is heard, or would be if it spoke. Simulated time waits for that, so that
+  /// the first touch does not depend on how soon the network found the robot. Thread-safe.
+  virtual bool is_settled() const = 0;
 };
 
 }  // namespace exemplar::capture_tactile
