@@ -45,7 +45,7 @@ class Client:
 
     def end(self):
         self.process.stdin.close()
-        self.process.wait(10)
+        self.process.wait(60)
         self.process.stdout.close()
 
 
@@ -60,10 +60,11 @@ class FoxgloveTest(unittest.TestCase):
         cls.addClassCleanup(cls.programs.end)
         scene = cls.folder / "scene.yaml"
         scene.write_text(SCENE, encoding="utf-8")
-        cls.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", scene, "--cameras", "off", "--track-hz", "20")
+        # The simulated time waits for the executor: how busy the machine is does not matter.
+        cls.programs.start("exemplar-simulator", "--robot", ROBOT, "--scene", scene, "--cameras", "off", "--track-hz", "20", "--in-step-with", "executor")
         _, recorder = cls.programs.recorder()
         learning = cls.server("exemplar-learning", "--data-dir", cls.folder / "skills", "--robot", ROBOT, bus=False)
-        executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", scene, "--learning", learning)
+        executor = cls.server("exemplar-executor", "--robot", ROBOT, "--scene", scene, "--learning", learning, "--clock", "network")
         port_file = cls.folder / "http-port"
         cls.address = cls.server(
             "exemplar-gateway", "--learning", learning, "--executor", executor, "--recorder", recorder, "--robot", ROBOT,
@@ -88,7 +89,7 @@ class FoxgloveTest(unittest.TestCase):
         return client
 
     def metrics(self):
-        with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/metrics", timeout=10) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/metrics", timeout=60) as answer:
             rows = (line.rpartition(" ") for line in answer.read().decode().splitlines() if not line.startswith("#"))
             return {name: float(value) for name, _, value in rows}
 

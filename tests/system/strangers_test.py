@@ -32,9 +32,11 @@ class StrangersTest(unittest.TestCase):
         self.server = server
         topic = f"lab/{kind}"
         command = [self.writer, "95", partition, topic, kind, COUNT, *schema]
-        writer = subprocess.Popen([str(word) for word in command])
-        exemplar("record", "start", "--name", kind, "--topic", topic, "--wait", "20", "--server", server)
-        self.assertEqual(writer.wait(60), 0, self.programs.logs())
+        with subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE) as writer:
+            self.addCleanup(writer.kill)
+            exemplar("record", "start", "--name", kind, "--topic", topic, "--wait", "60", "--server", server)
+            writer.stdin.write(b"\n")
+        self.assertEqual(writer.returncode, 0, self.programs.logs())
         status = exemplar("record", "stop", "--server", server)
         figures = next(entry for entry in status["topics"] if entry["topic"] == topic)
         self.assertEqual(figures["lost"], 0)

@@ -60,7 +60,7 @@ const changed = () => {
   for (const wake of woken) wake();
 };
 const until = async (condition) => {
-  const end = Date.now() + 20000;
+  const end = Date.now() + 90000;
   while (!condition()) {
     if (Date.now() > end) throw new Error("waited in vain");
     await new Promise((wake) => {
@@ -99,7 +99,7 @@ let calls = 0;
 const encode = (value) => new TextEncoder().encode(JSON.stringify(value));
 const commands = {
   async greeting() {
-    await until(() => info && (services.size > 0 || !info.capabilities.includes("services")));
+    await until(() => info && channels.size > 0 && (services.size > 0 || !info.capabilities.includes("services")));
     return { info, channels: [...channels.values()], services: [...services.values()], subprotocol: socket.protocol };
   },
   async subscribe({ topic }) {

@@ -1,6 +1,7 @@
 /* What a ROS 2 node on Cyclone DDS would do, by ROS 2's names, types and qualities of service.
-   usage: node DOMAIN listen SECONDS   prints one JSON object a message; latched topics first
-          node DOMAIN robot SECONDS    publishes the joint states of a robot at 100 Hz on /robot/joint_states */
+   usage: node DOMAIN listen TOPIC=COUNT...   prints one JSON object a message until each topic has a writer and so many messages of it
+                                              have come, or for a minute
+          node DOMAIN robot SECONDS           publishes the joint states of a robot at 100 Hz on /robot/joint_states */
 #include <dds/dds.h>
 #include <math.h>
 #include <stdio.h>
@@ -207,8 +208,41 @@ static void print_participants(dds_entity_t participant) {
   }
 }
 
-static void listen(dds_entity_t participant, double seconds) {
+/* Whether all that is wanted has come. */
+static int is_heard(const dds_entity_t* readers, const int* wanted, const int* heard) {
+  for (int i = 0; i < kCount; ++i) {
+    if (wanted[i] < 0) continue;
+    dds_subscription_matched_status_t matched;
+    check(dds_get_subscription_matched_status(readers[i], &matched), "matched");
+    if (matched.current_count == 0 || heard[i] < wanted[i]) return 0;
+  }
+  return 1;
+}
+
+/* Reads "TOPIC=COUNT" into `wanted`, -1 for what is not named. */
+static void read_wanted(int count, char** words, int* wanted) {
+  for (int i = 0; i < kCount; ++i) wanted[i] = -1;
+  for (int k = 0; k < count; ++k) {
+    const char* equals = strchr(words[k], '=');
+    int found = 0;
+    for (int i = 0; i < kCount && equals != NULL; ++i) {
+      const size_t length = (size_t)(equals - words[k]);
+      if (strlen(kTopics[i].topic) != length || strncmp(kTopics[i].topic, words[k], length) != 0) continue;
+      wanted[i] = atoi(equals + 1);
+      found = 1;
+    }
+    if (!found) {
+      fprintf(stderr, "%s is not TOPIC=COUNT\n", words[k]);
+      exit(2);
+    }
+  }
+}
+
+static void listen(dds_entity_t participant, int count, char** words) {
   dds_entity_t readers[kCount];
+  int wanted[kCount];
+  int heard[kCount] = {0};
+  read_wanted(count, words, wanted);
   (void)announce(participant);
   const dds_entity_t waitset = dds_create_waitset(participant);
   for (int i = 0; i < kCount; ++i) {
@@ -219,14 +253,15 @@ static void listen(dds_entity_t participant, double seconds) {
     const dds_entity_t condition = dds_create_readcondition(readers[i], DDS_ANY_STATE);
     check(dds_waitset_attach(waitset, condition, i), "waitset");
   }
-  const dds_time_t end = dds_time() + (dds_time_t)(seconds * 1e9);
-  while (dds_time() < end) {
+  const dds_time_t end = dds_time() + DDS_SECS(60);
+  while (!is_heard(readers, wanted, heard) && dds_time() < end) {
     (void)dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(100));
     for (int i = 0; i < kCount; ++i) {
       void* message[1] = {NULL};
       dds_sample_info_t info[1];
       while (dds_take(readers[i], message, info, 1, 1) > 0) {
         if (info[0].valid_data) {
+          ++heard[i];
           kTopics[i].print(kTopics[i].topic, message[0]);
           printf("}\n");
         }
@@ -264,11 +299,11 @@ static void robot(dds_entity_t participant, double seconds) {
 }
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 2;
+  if (argc < 4) return 2;
   const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);
   check(participant, "participant");
   if (strcmp(argv[2], "listen") == 0) {
-    listen(participant, atof(argv[3]));
+    listen(participant, argc - 3, argv + 3);
   } else {
     robot(participant, atof(argv[3]));
   }

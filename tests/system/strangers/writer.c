@@ -1,4 +1,5 @@
-/* Writes COUNT samples of one topic with Cyclone DDS, waits until they are acknowledged, and goes.
+/* Once somebody reads and a line has come on its standard input, writes COUNT samples of one topic with Cyclone DDS,
+   waits until they are acknowledged, and goes.
    usage: writer DOMAIN PARTITION|- TOPIC plain|keyed COUNT [SCHEMA_FILE] */
 #include <dds/dds.h>
 #include <stdio.h>
@@ -44,7 +45,7 @@ int main(int argc, char** argv) {
   free(schema);
 
   dds_publication_matched_status_t matched = {0};
-  for (int i = 0; i < 2000 && matched.current_count == 0; ++i) {
+  for (int i = 0; i < 6000 && matched.current_count == 0; ++i) {
     check(dds_get_publication_matched_status(writer, &matched), "matched");
     dds_sleepfor(DDS_MSECS(10));
   }
@@ -52,7 +53,7 @@ int main(int argc, char** argv) {
     fprintf(stderr, "no reader\n");
     return 1;
   }
-  dds_sleepfor(DDS_SECS(2)); /* the test starts its recording */
+  if (getchar() == EOF) return 1;
   for (int i = 1; i <= count; ++i) {
     if (keyed) {
       char sensor[16];
@@ -67,7 +68,7 @@ int main(int argc, char** argv) {
       check(dds_write(writer, &sample), "write");
     }
   }
-  check(dds_wait_for_acks(writer, DDS_SECS(20)), "acknowledgments");
+  check(dds_wait_for_acks(writer, DDS_SECS(60)), "acknowledgments");
   dds_delete(participant);
   return 0;
 }
