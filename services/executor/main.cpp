@@ -1,5 +1,6 @@
 // exemplar-executor: carries skills out on a robot, checked for collisions, over DDS.
 
+#include <algorithm>
 #include <filesystem>
 
 #include "executor/executor.hpp"
@@ -109,6 +110,8 @@ int main(int argc, char** argv) {
   teleoperation.dead_man_patience = FromSeconds(dead_man_patience_s);
   settings.planner.state_patience = FromSeconds(state_patience_s);
   settings.watch.stream.delay_patience = settings.planner.state_patience;
+  settings.watch.stream.frozen_patience =
+      std::max(settings.watch.stream.frozen_patience, settings.planner.state_patience);
   settings.watch.stream.command_patience = FromSeconds(command_patience_s);
   settings.safety_patience = FromSeconds(safety_patience_s);
   settings.planner.plan.inverse_kinematics = *motion::ParsePathIkVariant(way);
