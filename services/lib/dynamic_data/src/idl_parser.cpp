@@ -107,7 +107,9 @@ class Parser {
 
   void Module() {
     const std::string outer = scope_;
-    if (std::count(scope_.begin(), scope_.end(), ':') > 2 * kDeepest) Fail("modules lie too deep");
+    if (std::count(scope_.begin(), scope_.end(), ':') > std::ptrdiff_t{2} * kDeepest) {
+      Fail("modules lie too deep");
+    }
     scope_ = Scoped(Name());
     Expect("{");
     while (!Is("}")) {

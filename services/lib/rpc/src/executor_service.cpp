@@ -190,7 +190,7 @@ class ExecutorService final : public v1::ExecutorService::Service {
 
  private:
   Result<api::ExecutionResult> BeginMotion(const api::ExecuteRequest& request) {
-    return motions_.Begin([this, request](const auto& tell, std::stop_token stop) {
+    return motions_.Begin([this, request](const auto& tell, const std::stop_token& stop) {
       return executor_.Execute(
           request,
           [&tell](const api::ExecutionFeedback& now) {
@@ -200,12 +200,12 @@ class ExecutorService final : public v1::ExecutorService::Service {
             moving.plan.duration_s = now.duration_s;
             tell(std::move(moving));
           },
-          std::move(stop));
+          stop);
     });
   }
 
   Result<api::TeleoperationResult> BeginTeleoperation(const api::TeleoperationRequest& request) {
-    return teleoperations_.Begin([this, request](const auto& tell, std::stop_token stop) {
+    return teleoperations_.Begin([this, request](const auto& tell, const std::stop_token& stop) {
       return executor_.Teleoperate(
           request,
           [&tell](const api::TeleoperationFeedback& now) {
@@ -214,7 +214,7 @@ class ExecutorService final : public v1::ExecutorService::Service {
             on.detail = now.detail;
             tell(std::move(on));
           },
-          std::move(stop));
+          stop);
     });
   }
 

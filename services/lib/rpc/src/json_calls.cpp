@@ -18,7 +18,6 @@
 namespace exemplar::rpc {
 namespace {
 
-using google::protobuf::Descriptor;
 using google::protobuf::Message;
 using google::protobuf::MethodDescriptor;
 using grpc::StatusCode;
@@ -88,10 +87,10 @@ Result<std::deque<grpc::ByteBuffer>> ReadRequests(const MethodDescriptor& method
   const auto read = [&](std::string_view json, int line) -> Status {
     const std::unique_ptr<Message> message = NewMessage(*method.input_type());
     if (json.find_first_not_of(" \t\r\n") != std::string_view::npos) {
-      if (const Status done = ReadJson(json, line, *message); !done) return done;
+      if (Status done = ReadJson(json, line, *message); !done) return done;
     }
     for (const auto& [path, value] : call.fields) {
-      if (const Status set = SetField(path, value, *message); !set) return set;
+      if (Status set = SetField(path, value, *message); !set) return set;
     }
     requests.push_back(ToBuffer(*message));
     return {};
@@ -171,9 +170,8 @@ class Exchange {
       stream_->WritesDone(&written_);
       return;
     }
-    const grpc::ByteBuffer request = std::move(requests_.front());
+    stream_->Write(requests_.front(), &written_);
     requests_.pop_front();
-    stream_->Write(request, &written_);
   }
 
   std::deque<grpc::ByteBuffer> requests_;

@@ -31,6 +31,7 @@ std::string PlaceOf(std::string_view text, std::size_t byte, int first_line) {
 
 Error NoSuchField(const Descriptor& type, const std::string& name, const std::string& path) {
   std::vector<std::string> names;
+  names.reserve(static_cast<std::size_t>(type.field_count()));
   for (int i = 0; i < type.field_count(); ++i) names.push_back(type.field(i)->name());
   const std::optional<std::string> near = NearestName(name, names);
   return InvalidArgument(path + ": " + type.name() + " has no such field" +
