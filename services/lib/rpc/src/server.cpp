@@ -58,14 +58,14 @@ class GrpcServer final : public Server {
     if (server_) GrpcServer::Shutdown(std::chrono::seconds(1));
   }
 
-  Status Start(Services services) {
+  Status Start(const Services& services) {
     const ServerOptions& options = shared_.options();
     const Result<std::string> host = HostOf(options.listen);
     if (!host) return host.error();
-    if (const Status may = CheckListening(*host, options.credentials); !may) return may;
+    if (Status may = CheckListening(*host, options.credentials); !may) return may;
     const auto credentials = MakeServerCredentials(options.credentials);
     if (!credentials) return credentials.error();
-    if (const Status opened = shared_.guard().Open(); !opened) return opened;
+    if (Status opened = shared_.guard().Open(); !opened) return opened;
     served_ = ServicesOf(services);
     if (services.trials) services_.push_back(MakeTrialService(shared_, *services.trials));
     if (services.skills) services_.push_back(MakeSkillService(shared_, *services.skills));
@@ -170,7 +170,8 @@ Status CheckListenAddress(const std::string& address,
   return host ? CheckListening(*host, credentials) : host.error();
 }
 
-Result<std::unique_ptr<Server>> Server::Create(const ServerOptions& options, Services services) {
+Result<std::unique_ptr<Server>> Server::Create(const ServerOptions& options,
+                                               const Services& services) {
   auto server = std::make_unique<GrpcServer>(options);
   if (const Status status = server->Start(services); !status) return status.error();
   return std::unique_ptr<Server>(std::move(server));

@@ -100,7 +100,8 @@ class Server {
   /// Listens when it returns. Errors name the address, the port file, or the option of the
   /// credentials. An address beyond loopback is refused unless callers come with TLS and are known
   /// by certificate or token, or the credentials say that it may be insecure.
-  static Result<std::unique_ptr<Server>> Create(const ServerOptions& options, Services services);
+  static Result<std::unique_ptr<Server>> Create(const ServerOptions& options,
+                                                const Services& services);
   /// As Shutdown(1 s).
   virtual ~Server() = default;
 
