@@ -139,7 +139,7 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
   }
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, places_.size());
-    const Status started =
+    Status started =
         WhileStill([&] { return recorder_->Start(name, performed->trial.source, stop); }, stop);
     if (!started) return started;
   }
@@ -205,7 +205,7 @@ Status PersonSession::BeFollowed(const std::stop_token& stop) {
   if (!dead_man_) return {};
   dead_man_->BeginToPress();
   const Duration deadline = clock_.Steady() + kFollowTimeout;
-  const Status stood = StandStill(
+  Status stood = StandStill(
       [&] {
         dead_man_->GoOnPressing();
         return !dead_man_->followed() && clock_.Steady() < deadline;
@@ -215,7 +215,8 @@ Status PersonSession::BeFollowed(const std::stop_token& stop) {
   return stood;
 }
 
-Status PersonSession::MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop) {
+Status PersonSession::MoveTo(const Eigen::VectorXd& goal, double seconds,
+                             const std::stop_token& stop) {
   const Eigen::VectorXd from = posture_;
   const int steps = std::max(1, static_cast<int>(std::lround(seconds * options_.person.rate_hz)));
   const Duration start = clock_.Steady();
@@ -238,7 +239,7 @@ Status PersonSession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture) {
   return suit_->Write(std::move(sample));
 }
 
-void PersonSession::WaitForReaders(std::stop_token stop) {
+void PersonSession::WaitForReaders(const std::stop_token& stop) {
   // The simulated robot, and the recorder where there is one.
   const int wanted = recorder_ ? 2 : 1;
   const ircp::TimeHold hold(clock_);

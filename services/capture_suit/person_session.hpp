@@ -55,7 +55,7 @@ class PersonSession final : public Session {
 
   Status Perform(std::size_t index, std::stop_token stop);
   /// Sends a smooth way from where the suit is to `goal`.
-  Status MoveTo(const Eigen::VectorXd& goal, double seconds, std::stop_token stop);
+  Status MoveTo(const Eigen::VectorXd& goal, double seconds, const std::stop_token& stop);
   /// Sends the last posture again and again meanwhile, as a suit does whose wearer stands still.
   Status WhileStill(const std::function<Status()>& work, const std::stop_token& stop);
   /// The same as long as `goes_on`, which is asked before each sample.
@@ -63,7 +63,7 @@ class PersonSession final : public Session {
   /// Presses the dead-man and waits for the robot, where there is one to wait for.
   Status BeFollowed(const std::stop_token& stop);
   Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture);
-  void WaitForReaders(std::stop_token stop);
+  void WaitForReaders(const std::stop_token& stop);
   bool WaitForAcknowledgments(const std::stop_token& stop);
 
   const Clock& clock_;

@@ -45,6 +45,7 @@ Result<std::unique_ptr<ReplaySession>> ReplaySession::Create(
   }
   // Only to see which topics are needed: stamps are given when a trial is played.
   std::vector<ircp::TrialSamples> samples;
+  samples.reserve(trials.size());
   for (const demonstration::Trial& trial : trials) {
     samples.push_back(ircp::SamplesOf(trial, Stamp{}, options.frame));
   }
@@ -76,7 +77,7 @@ Status ReplaySession::Run(std::stop_token stop) {
   return {};
 }
 
-Status ReplaySession::PlayOne(std::size_t index, std::stop_token stop) {
+Status ReplaySession::PlayOne(std::size_t index, const std::stop_token& stop) {
   const demonstration::Trial& trial = trials_[index];
   const std::string place =
       "trial " + std::to_string(index + 1) + " of " + std::to_string(trials_.size());
@@ -139,7 +140,7 @@ std::vector<ircp::TopicCount> ReplaySession::sent() const {
   return counts;
 }
 
-void ReplaySession::WaitForReaders(std::stop_token stop) {
+void ReplaySession::WaitForReaders(const std::stop_token& stop) {
   const ircp::TimeHold hold(clock_);
   const Clock& real = ircp::RealTimeOf(clock_);
   const Duration deadline = real.Steady() + kReaderTimeout;
