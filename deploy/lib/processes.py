@@ -29,7 +29,7 @@ class Process:
             [str(binary), *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=self._stderr, stderr=self._stderr
         )
 
-    def address(self, timeout_s=20):
+    def address(self, timeout_s=60):
         """HOST:PORT of its gRPC server, once it listens."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
@@ -85,7 +85,7 @@ class Secured:
         self._run("issue", folder, "operator", "--role", "person", "--call", "administer")
 
     def _run(self, *words):
-        done = subprocess.run([str(word) for word in (self.exemplar, "security", *words)], capture_output=True, text=True, timeout=30)
+        done = subprocess.run([str(word) for word in (self.exemplar, "security", *words)], capture_output=True, text=True, timeout=60)
         if done.returncode != 0:
             raise Failure(f"exemplar security {words[0]}: {done.stderr.strip()}")
 

@@ -31,7 +31,7 @@ class RoadTest(unittest.TestCase):
         cls.files = trials.write_set(cls.folder / "trials", BUTTONS)
         command = [sys.executable, ROOT / "deploy" / "lib" / "demo.py", "--headless", "--bin", BINARIES]
         command += ["--rate", "3", "--keep", cls.folder / "demo", "--domain", "91", "--trials", *cls.files]
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=150)
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=220)
         cls.stderr = done.stderr
         assert done.stdout, done.stderr
         cls.figures = json.loads(done.stdout.splitlines()[-1])
@@ -63,7 +63,7 @@ class RoadTest(unittest.TestCase):
             self.skipTest("tests/conformance/node has no node_modules: run npm ci there")
         for number, file in enumerate(self.files[:-1], start=1):
             recording = self.folder / "demo" / "recordings" / f"trial-{number:03}.mcap"
-            done = subprocess.run(["node", NODE / "read_recording.mjs", recording], capture_output=True, text=True, timeout=60)
+            done = subprocess.run(["node", NODE / "read_recording.mjs", recording], capture_output=True, text=True, timeout=120)
             self.assertEqual(done.returncode, 0, done.stderr)
             topic = json.loads(done.stdout)["topics"]["ircp/end_effector"]
             with open(file, newline="", encoding="utf-8") as stream:

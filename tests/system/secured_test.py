@@ -20,6 +20,7 @@ import threading
 import unittest
 
 import trials
+from processes import wait_for
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BINARIES = pathlib.Path(os.environ.get("EXEMPLAR_BIN", ROOT / "build" / "release" / "bin"))
@@ -72,7 +73,7 @@ class Wire:
 def demo(folder, files, *options):
     command = [sys.executable, ROOT / "deploy" / "lib" / "demo.py", "--headless", "--bin", BINARIES, "--rate", "3", "--keep", folder]
     command += ["--domain", "92", *options, "--trials", *files]
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=200)
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=220)
 
 
 def seen(packets, words):
@@ -111,14 +112,16 @@ class SecuredTest(unittest.TestCase):
         wire = Wire()
         folder = self.folder / "open"
         folder.mkdir()
+        port = folder / "port"
         recorder = subprocess.Popen(
-            [BINARIES / "exemplar-recorder", "--domain", "93", "--data-dir", folder, "--listen", "127.0.0.1:0"],
+            [BINARIES / "exemplar-recorder", "--domain", "93", "--data-dir", folder, "--listen", "127.0.0.1:0", "--port-file", port],
             stderr=subprocess.DEVNULL,
         )
+        wait_for(port.exists, "the recorder")
         capture = [BINARIES / "exemplar-capture-suit", "--domain", "93", "--replay", self.files[0], "--rate", "4", "--record"]
-        done = subprocess.run(capture, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(capture, capture_output=True, text=True, timeout=90)
         recorder.send_signal(signal.SIGTERM)
-        recorder.wait(10)
+        recorder.wait(60)
         packets = wire.stop()
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertLessEqual({b"ircp/end_effector", b"ircp/objects", b"ircp/recorder/status"}, seen(packets, TOPICS))
@@ -132,7 +135,7 @@ class SecuredTest(unittest.TestCase):
         folder = self.folder / "page"
         folder.mkdir()
         for command in commands:
-            done = subprocess.run([BINARIES / "exemplar", *shlex.split(command)[1:]], cwd=folder, capture_output=True, text=True, timeout=30)
+            done = subprocess.run([BINARIES / "exemplar", *shlex.split(command)[1:]], cwd=folder, capture_output=True, text=True, timeout=60)
             self.assertEqual(done.returncode, 0, f"{command}: {done.stderr}")
 
     def test_audit_lines_say_who_moved_the_robot(self):
