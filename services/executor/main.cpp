@@ -1,6 +1,7 @@
 // exemplar-executor: carries skills out on a robot, checked for collisions, over DDS.
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 
 #include "executor/executor.hpp"
@@ -22,6 +23,7 @@ int main(int argc, char** argv) {
   std::string learning;
   executor::ExecutorOptions settings;
   settings.realtime = true;
+  settings.rest_patience = std::chrono::seconds(10);  // simulated time may go on slowly
   settings.planner.guard.touch_n = 8;
 
   program::Options options(

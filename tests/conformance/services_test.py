@@ -53,7 +53,7 @@ class ServicesTest(unittest.TestCase):
 
     def run_node(self, address, **shown):
         command = [str(word) for word in ("node", NODE / "call_services.mjs", address, *self.files)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=os.environ | {name: str(value) for name, value in shown.items()})
+        return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, env=os.environ | {name: str(value) for name, value in shown.items()})
 
     def call(self, address, **shown):
         """What each method answered. `shown` goes into the environment."""

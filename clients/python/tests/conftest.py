@@ -140,8 +140,8 @@ class TeleoperatedStation(Station):
         self._addresses["learning"] = learning
         self.simulator_words = []
         # A busy machine is no fault of the robot's.
-        self.executor_words = ["--state-patience-s", "2", "--command-patience-s", "2"]
-        self.executor_words += ["--suit-patience-s", "0.5", "--dead-man-patience-s", "0.6"]
+        self.executor_words = ["--state-patience-s", "5", "--command-patience-s", "5"]
+        self.executor_words += ["--suit-patience-s", "2", "--dead-man-patience-s", "2"]
 
 
 @pytest.fixture(scope="module")

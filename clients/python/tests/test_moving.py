@@ -23,7 +23,7 @@ def robot(moving: MovingStation, press: exemplar.Skill) -> Iterator[exemplar.Cli
 
 def run(name: str, *words: object) -> str:
     command = [sys.executable, EXAMPLES / name, *words]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -22,7 +22,7 @@ def station_client(station: Station, press: exemplar.Skill) -> Iterator[exemplar
         yield client
 
 
-def until(condition: object, limit_s: float = 20.0) -> None:
+def until(condition: object, limit_s: float = 60.0) -> None:
     deadline = time.monotonic() + limit_s
     assert callable(condition)
     while not condition():
@@ -34,7 +34,7 @@ def at_rest(client: exemplar.Client) -> bool:
     """Whether the robot has come to rest: until then, no other motion is planned."""
     try:
         return client.robot.plan("press", TARGET).duration_s > 0
-    except exemplar.FailedPreconditionError:
+    except (exemplar.FailedPreconditionError, exemplar.UnavailableError):  # the latter after a while of slowing down
         return False
 
 
@@ -98,7 +98,7 @@ def test_an_execution_is_recorded_and_reported(station_client: exemplar.Client) 
 
 def test_a_motion_pauses_goes_on_and_is_cancelled(station_client: exemplar.Client) -> None:
     robot = station_client.robot
-    robot.set_speed(1.0)
+    robot.set_speed(0.3)  # not over before it is paused
     states = []
     execution = robot.execute("press", TARGET)
     for now in execution:
@@ -115,6 +115,7 @@ def test_a_motion_pauses_goes_on_and_is_cancelled(station_client: exemplar.Clien
     assert not result.done
     assert result.detail
     until(lambda: at_rest(station_client))
+    robot.set_speed(1.0)
 
 
 def test_cancelling_the_call_holds_the_robot(station_client: exemplar.Client) -> None:
@@ -136,6 +137,7 @@ def test_after_a_stop_motions_wait_for_a_reset(station: Station, station_client:
             with pytest.raises(exemplar.FailedPreconditionError):
                 await client.robot.execute("press", TARGET).result()
             await client.robot.reset()
+            await asyncio.to_thread(until, lambda: at_rest(station_client))
 
             # Whoever waits for a motion and is cancelled takes the motion with him.
             moving = client.robot.execute("press", TARGET)

@@ -35,7 +35,7 @@ def wait_for_rest(client: exemplar.Client) -> None:
     def resting() -> bool:
         try:
             return client.robot.plan("press", TARGET).duration_s > 0
-        except exemplar.FailedPreconditionError:
+        except (exemplar.FailedPreconditionError, exemplar.UnavailableError):
             return False
 
     processes.wait_for(resting, "the robot to come to rest")

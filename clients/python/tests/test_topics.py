@@ -81,7 +81,7 @@ def test_asyncio_does_the_same(gateway: exemplar.Client, station: Station) -> No
 def test_the_example_shows_topics_and_samples(gateway: exemplar.Client, station: Station) -> None:
     example = ROOT / "clients" / "python" / "examples" / "04_topics.py"
     command = [sys.executable, example, STATE, "--server", station._addresses["gateway"], "--samples", "3"]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("positions") == 3
     assert done.stdout.endswith("0 missed\n")

@@ -47,7 +47,7 @@ function call({ client }, method, requests, { take = Infinity } = {}) {
   const list = Array.isArray(requests) ? requests : [requests];
   return new Promise((resolve) => {
     const messages = [];
-    const deadline = Date.now() + 30_000;
+    const deadline = Date.now() + 100_000;
     const ended = (error) => {
       const cut = error?.code === grpc.status.CANCELLED && messages.length >= take;
       answers[method.path.slice(1)] = error && !cut ? error.code : OK;
