@@ -198,6 +198,8 @@ TEST_F(BusTest, StationsNeverMix) {
   // The other station's writer comes last: once its sample is here, a leak of the first would be.
   ASSERT_TRUE(Eventually([&] { return writer_b->matched_readers() == 2; }));
   ASSERT_TRUE(Eventually([&] { return (*tap)->matched_writers("ircp/safety") == 1; }));
+  ASSERT_TRUE(Eventually(
+      [&] { return reader_a->matched_writers() == 1 && reader_b->matched_writers() == 1; }));
   ASSERT_TRUE(writer_a->Write({}).ok());
   ASSERT_TRUE(Eventually([&] { return inbox_a.size() == 1; }));
   ASSERT_TRUE(writer_b->Write({}).ok());
@@ -433,7 +435,8 @@ TEST_F(BusTest, ClocksAreComparedOverTheNetwork) {
         const std::lock_guard lock(mutex);
         name = reception.writer;
       });
-  ASSERT_TRUE(Eventually([&] { return writer->matched_readers() == 1; }));
+  ASSERT_TRUE(
+      Eventually([&] { return writer->matched_readers() == 1 && reader->matched_writers() == 1; }));
   ASSERT_TRUE(writer->Write(Suit(1)).ok());
   ASSERT_TRUE(Eventually([&] {
     const std::lock_guard lock(mutex);
