@@ -53,6 +53,17 @@ TEST_F(RevocationWatchTest, TellsOnceThatSomebodyElseIsRevoked) {
   EXPECT_EQ(told_, 1);
 }
 
+TEST_F(RevocationWatchTest, RemindsDayByDay) {
+  std::atomic<int> days{0};
+  const RevocationWatch watch({.list = list_,
+                               .on_revoked = [this](const std::string&) { ++told_; },
+                               .on_day = [&days] { ++days; },
+                               .period = std::chrono::milliseconds(1),
+                               .day = std::chrono::milliseconds(3)});
+  ASSERT_TRUE(Eventually([&] { return days >= 2; }));
+  EXPECT_EQ(told_, 0);
+}
+
 TEST_F(RevocationWatchTest, SaysNothingOfNewMembersOrOfAListThatIsHalfWritten) {
   {
     const auto watch = Watch();

@@ -10,6 +10,7 @@
 #include "exemplar/base/clock.hpp"
 #include "exemplar/security/access.hpp"
 #include "exemplar/security/certificate.hpp"
+#include "exemplar/security/dds_documents.hpp"
 #include "exemplar/security/digest.hpp"
 #include "exemplar/security/station_role.hpp"
 
@@ -163,6 +164,30 @@ TEST_F(StationTest, FoldersThatCannotWorkAreRefusedWithTheReason) {
   fs::copy_file(FilesOf(recorder).key, FilesOf(executor).key, fs::copy_options::overwrite_existing);
   EXPECT_THAT(CheckMemberFolder(executor, "lab", now_).error().message,
               HasSubstr("is not the key of"));
+}
+
+TEST_F(StationTest, FoldersAreWarnedOfBeforeTheyEnd) {
+  using std::chrono::hours;
+  const fs::path executor = Issue("executor", "executor", 40);
+  EXPECT_THAT(MemberFolderWarnings(executor, now_), testing::IsEmpty());
+  EXPECT_THAT(MemberFolderWarnings(executor, now_ + hours(24 * 11)),
+              testing::ElementsAre(testing::AllOf(HasSubstr("cert.pem"), HasSubstr("28 more days"),
+                                                  HasSubstr("issue the member again"))));
+  EXPECT_THAT(MemberFolderWarnings(executor, now_ + hours(24 * 3660)),
+              testing::ElementsAre(HasSubstr("and so no more"), HasSubstr("ca.pem")));
+  EXPECT_NEAR(DaysLeft(ListMembers(folder_)->front().not_after, now_), 40, 0.01);
+}
+
+TEST_F(StationTest, FoldersWithAnotherVersionsGovernanceAreWarnedOf) {
+  const fs::path executor = Issue("executor", "executor", 40);
+  std::string governance = GovernanceXml();
+  const std::string strong = "ENCRYPT_WITH_ORIGIN_AUTHENTICATION";
+  governance.replace(governance.find(strong), strong.size(), "ENCRYPT");
+  const KeyPair authority{.certificate = Text(folder_ / "authority/ca.pem"),
+                          .key = Text(folder_ / "authority/ca.key")};
+  std::ofstream(FilesOf(executor).governance) << *SignDocument(authority, governance);
+  EXPECT_THAT(MemberFolderWarnings(executor, now_),
+              testing::ElementsAre(HasSubstr("another version's")));
 }
 
 TEST_F(StationTest, NamesThatWouldLeaveTheirPlaceAreRefused) {

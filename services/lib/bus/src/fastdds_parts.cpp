@@ -26,6 +26,7 @@
 #include "exemplar/base/text.hpp"
 #include "exemplar/security/station.hpp"
 #include "greeting_guard.hpp"
+#include "message_guard.hpp"
 
 namespace exemplar::bus {
 namespace {
@@ -166,12 +167,27 @@ Result<DiscoveryServers> FindDiscoveryServers(const std::vector<std::string>& ad
   return servers;
 }
 
+void WarnOfFolder(const ParticipantOptions& options) {
+  if (options.log == nullptr) return;
+  for (const std::string& warning :
+       security::MemberFolderWarnings(options.security, SystemClock().Now())) {
+    options.log->Warning("the identity needs care", {{"what", warning}});
+  }
+}
+
 /// DDS-Security with the files of a member's folder.
 Status Secure(const ParticipantOptions& options, dds::DomainParticipantQos& qos) {
   if (options.security.empty()) return {};
   const Status checked =
       security::CheckMemberFolder(options.security, options.station, SystemClock().Now());
   if (!checked) return checked;
+  if (!MessagesAreGuarded()) {
+    return FailedPrecondition(
+        "--security: this Fast DDS believes messages in another's name, and does not let them be "
+        "refused",
+        "security");
+  }
+  WarnOfFolder(options);
   if (!GreetingsAreGuarded() && options.log != nullptr) {
     options.log->Warning("members that start at one moment may never meet",
                          {{"because", "this Fast DDS does not let their greetings be guarded"}});
@@ -202,13 +218,15 @@ std::shared_ptr<RevocationWatch> WatchRevocations(const ParticipantOptions& opti
   if (options.security.empty()) return nullptr;
   return std::make_shared<RevocationWatch>(RevocationWatch::Options{
       .list = security::FilesOf(options.security).revocations,
-      .on_revoked = [log = options.log](const std::string& serial) {
-        if (log != nullptr) {
-          log->Warning("ending: a member was revoked, and who starts again refuses it",
-                       {{"serial", serial}});
-        }
-        EndProcess();
-      }});
+      .on_revoked =
+          [log = options.log](const std::string& serial) {
+            if (log != nullptr) {
+              log->Warning("ending: a member was revoked, and who starts again refuses it",
+                           {{"serial", serial}});
+            }
+            EndProcess();
+          },
+      .on_day = [options] { WarnOfFolder(options); }});
 }
 
 }  // namespace

@@ -46,7 +46,13 @@ RevocationWatch::RevocationWatch(Options options) {
         std::mutex mutex;
         std::condition_variable_any never;
         std::unique_lock lock(mutex);
+        using Clock = std::chrono::steady_clock;
+        Clock::time_point next_day = Clock::now() + options.day;
         while (!never.wait_for(lock, stop, options.period, [&] { return stop.stop_requested(); })) {
+          if (options.on_day && Clock::now() >= next_day) {
+            options.on_day();
+            next_day = Clock::now() + options.day;
+          }
           const auto now = SerialsOn(options.list);
           if (!now) continue;
           if (const std::optional<std::string> serial = FirstNew(known, *now)) {

@@ -16,7 +16,10 @@ class RevocationWatch {
     /// Called once, on the watch's thread, with the first serial number that stands on the list and
     /// did not when the watch was made.
     std::function<void(const std::string& serial)> on_revoked;
+    /// Called each day, likewise: time to look at what ends by itself. May be null.
+    std::function<void()> on_day = nullptr;
     std::chrono::milliseconds period = std::chrono::seconds(1);
+    std::chrono::milliseconds day = std::chrono::hours(24);
   };
   /// A list that cannot be read is taken for the one before it.
   explicit RevocationWatch(Options options);

@@ -13,7 +13,9 @@ constexpr const char* kHead = R"(<?xml version="1.0" encoding="UTF-8"?>
 constexpr const char* kDomains =
     "<domains><id_range><min>0</min><max>232</max></id_range></domains>";
 
-void WriteTopicRule(std::ostream& out, const char* topic, const char* protection) {
+/// `samples`: of the sample itself, for its matched readers; `messages`: of what carries it.
+void WriteTopicRule(std::ostream& out, const char* topic, const char* messages,
+                    const char* samples) {
   out << R"(
         <topic_rule>
           <topic_expression>)"
@@ -23,8 +25,9 @@ void WriteTopicRule(std::ostream& out, const char* topic, const char* protection
           <enable_read_access_control>true</enable_read_access_control>
           <enable_write_access_control>true</enable_write_access_control>
           <metadata_protection_kind>)"
-      << protection << R"(</metadata_protection_kind>
-          <data_protection_kind>NONE</data_protection_kind>
+      << messages << R"(</metadata_protection_kind>
+          <data_protection_kind>)"
+      << samples << R"(</data_protection_kind>
         </topic_rule>)";
 }
 
@@ -55,10 +58,10 @@ std::string GovernanceXml() {
       <enable_join_access_control>true</enable_join_access_control>
       <discovery_protection_kind>ENCRYPT</discovery_protection_kind>
       <liveliness_protection_kind>ENCRYPT</liveliness_protection_kind>
-      <rtps_protection_kind>ENCRYPT</rtps_protection_kind>
+      <rtps_protection_kind>ENCRYPT_WITH_ORIGIN_AUTHENTICATION</rtps_protection_kind>
       <topic_access_rules>)";
-  WriteTopicRule(out, "ircp/joint_command", "ENCRYPT_WITH_ORIGIN_AUTHENTICATION");
-  WriteTopicRule(out, "*", "ENCRYPT");
+  WriteTopicRule(out, "ircp/joint_command", "ENCRYPT_WITH_ORIGIN_AUTHENTICATION", "ENCRYPT");
+  WriteTopicRule(out, "*", "ENCRYPT", "NONE");
   out << R"(
       </topic_access_rules>
     </domain_rule>

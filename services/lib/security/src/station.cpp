@@ -144,6 +144,16 @@ Result<std::string> RoleOf(const fs::path& member) {
   }
 }
 
+/// Whoever was given the folder goes on being able to read what is new in it.
+Status GiveToOwner(const fs::path& file) {
+  struct stat owner {};
+  if (::stat(file.parent_path().c_str(), &owner) == 0 && owner.st_uid != ::geteuid() &&
+      ::chown(file.c_str(), owner.st_uid, owner.st_gid) != 0) {
+    return FailedPrecondition(file.string() + " cannot be given to the folder's owner", "folder");
+  }
+  return {};
+}
+
 /// The station's access file, and the copies of those that are called.
 Status WriteAccess(const fs::path& folder, const AccessList& access) {
   if (Status written = WriteAccessList(folder / "access.yaml", access); !written) return written;
@@ -153,13 +163,7 @@ Status WriteAccess(const fs::path& folder, const AccessList& access) {
     const StationRole* role = FindStationRole(*name);
     if (role == nullptr || !role->serves) continue;
     if (Status written = WriteAccessList(member / "access.yaml", access); !written) return written;
-    // Whoever was given the folder goes on being able to read what is new in it.
-    struct stat owner {};
-    if (::stat(member.c_str(), &owner) == 0 && owner.st_uid != ::geteuid() &&
-        ::chown((member / "access.yaml").c_str(), owner.st_uid, owner.st_gid) != 0) {
-      return FailedPrecondition(
-          (member / "access.yaml").string() + " cannot be given to the folder's owner", "folder");
-    }
+    if (Status given = GiveToOwner(member / "access.yaml"); !given) return given;
   }
   return {};
 }
@@ -209,8 +213,15 @@ Status WriteMember(const fs::path& member, const Authority& authority, const Key
         std::tuple{files.permissions, &*permissions, kPublic},
         std::tuple{member / "member.yaml", &info, kPublic}}) {
     if (Status written = WriteText(file, *text, mode); !written) return written;
+    if (Status given = GiveToOwner(file); !given) return given;
   }
   return {};
+}
+
+/// A signed text as it was before signing, which may change how its lines end.
+std::string Unsigned(std::string text) {
+  std::erase(text, '\r');
+  return std::string(Trim(text));
 }
 
 }  // namespace
@@ -403,6 +414,40 @@ Status CheckMemberFolder(const fs::path& folder, const std::string& station, Sta
                               "security");
   }
   return {};
+}
+
+std::vector<std::string> MemberFolderWarnings(const fs::path& folder, Stamp now) {
+  const MemberFiles files = FilesOf(folder);
+  std::vector<std::string> warnings;
+  for (const auto& [file, remedy] :
+       {std::pair{files.certificate, "issue the member again (exemplar security issue)"},
+        std::pair{files.authority, "make the station anew (exemplar security init)"}}) {
+    const Result<std::string> pem = ReadText(file);
+    if (!pem) continue;
+    const Result<CertificateFacts> facts = ReadCertificate(*pem, file.string());
+    if (!facts) continue;
+    const double days = DaysLeft(facts->not_after, now);
+    if (days >= kFewDays) continue;
+    warnings.push_back(file.string() + " counts until " + ToIso8601(facts->not_after) + ", " +
+                       (days > 0 ? "for " + std::to_string(static_cast<int>(days)) + " more days"
+                                 : "and so no more") +
+                       ": " + remedy);
+  }
+  const Result<std::string> authority = ReadText(files.authority);
+  const Result<std::string> document = ReadText(files.governance);
+  if (!authority || !document) return warnings;
+  const Result<std::string> governance = VerifyDocument(*authority, *document);
+  if (governance && Unsigned(*governance) != Unsigned(GovernanceXml())) {
+    warnings.push_back(files.governance.string() +
+                       " is another version's: members do not meet those that have this one's, "
+                       "and may be less protected; issue all of them again");
+  }
+  return warnings;
+}
+
+double DaysLeft(Stamp not_after, Stamp now) {
+  constexpr double kSecondsADay = 86400;
+  return ToSeconds(not_after - now) / kSecondsADay;
 }
 
 }  // namespace exemplar::security

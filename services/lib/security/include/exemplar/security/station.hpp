@@ -70,4 +70,14 @@ Result<std::vector<MemberInfo>> ListMembers(const std::filesystem::path& folder)
 Status CheckMemberFolder(const std::filesystem::path& member_folder, const std::string& station,
                          Stamp now);
 
+/// A certificate with fewer days left is to be issued again.
+inline constexpr double kFewDays = 30;
+/// Negative once it counts no more.
+double DaysLeft(Stamp not_after, Stamp now);
+
+/// What is wrong soon with a member's folder that is well today: a certificate near its end; or
+/// documents of another version of this program. A sentence each.
+std::vector<std::string> MemberFolderWarnings(const std::filesystem::path& member_folder,
+                                              Stamp now);
+
 }  // namespace exemplar::security
