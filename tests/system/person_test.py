@@ -19,7 +19,7 @@ class PersonTest(unittest.TestCase):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-person-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
         command = [sys.executable, ROOT / "deploy" / "lib" / "demo.py", "--headless", "--bin", BINARIES, "--keep", cls.folder / "demo", "--domain", "92"]
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=220)
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=500)
         cls.stderr = done.stderr
         assert done.stdout, done.stderr
         cls.figures = json.loads(done.stdout.splitlines()[-1])

@@ -31,7 +31,7 @@ class RoadTest(unittest.TestCase):
         cls.files = trials.write_set(cls.folder / "trials", BUTTONS)
         command = [sys.executable, ROOT / "deploy" / "lib" / "demo.py", "--headless", "--bin", BINARIES]
         command += ["--rate", "3", "--keep", cls.folder / "demo", "--domain", "91", "--trials", *cls.files]
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=220)
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=500)
         cls.stderr = done.stderr
         assert done.stdout, done.stderr
         cls.figures = json.loads(done.stdout.splitlines()[-1])

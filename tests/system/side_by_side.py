@@ -13,7 +13,7 @@ import time
 import unittest
 
 AT_ONCE = 4
-LIMIT_S = 180
+LIMIT_S = 400
 HERE = pathlib.Path(__file__).resolve().parent
 
 

@@ -68,7 +68,7 @@ class SimulatedStation:
         person = self.programs.start(
             "exemplar-capture-suit", "--person", "--robot", self.robot, "--scene", self.scene, "--places", places, "--seed", self.seed, *words
         )
-        assert person.wait(120) == 0, self.programs.logs()
+        assert person.wait(400) == 0, self.programs.logs()
 
     def recorder_knows(self, *topics):
         def known():
