@@ -69,6 +69,16 @@ const actions = {
   fetch: ({ path, headers }) => page.evaluate(async ([where, fields]) => (await fetch(where, { method: "POST", headers: fields, body: "{}" })).status, [path, headers]),
   focused: () => page.evaluate(() => document.activeElement?.id ?? ""),
   theme: () => page.evaluate(() => document.documentElement.dataset.theme),
+  size: ({ width, height }) => page.setViewportSize({ width, height }).then(() => true),
+  /** Whether an element lies within the window, whole. */
+  inWindow: ({ of }) => page.$eval(of, (element) => {
+    const box = element.getBoundingClientRect();
+    return box.width > 0 && box.left >= 0 && box.top >= 0 && box.right <= innerWidth && box.bottom <= innerHeight;
+  }),
+  /** By how many pixels the page is wider than the window. */
+  overhang: () => page.evaluate(() => document.documentElement.scrollWidth - innerWidth),
+  toEnd: () => page.evaluate(() => scrollTo(0, document.documentElement.scrollHeight)).then(() => true),
+  enabled: ({ of }) => page.isEnabled(of),
   screenshot: ({ file }) => page.screenshot({ path: file }).then(() => true),
   problems: () => ({ problems, foreign: [...foreign] }),
 };

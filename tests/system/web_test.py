@@ -26,6 +26,11 @@ PAGE = pathlib.Path(os.environ.get("EXEMPLAR_WEB", ROOT / "build" / "web"))
 ROBOT = ROOT / "deploy" / "models" / "arm7"
 SCENE = "obstacles:\n  - {name: table, shape: box, size: [0.8, 1.2, 0.04], position: [0.75, 0, -0.02]}\n"
 SCENE += "buttons:\n  - {name: target, position: [0.55, -0.15, 0.05], height: 0.05, radius: 0.02}\n"
+# A person's posture that holds the robot at its home (deploy/models/arm7/suit.yaml).
+SUIT = {
+    "right shoulder in/out": 0.2, "right elbow in/out": 1.63, "right upper-arm rotation": 0.12, "right shoulder forward/backward": 0.13,
+    "right forearm rotation": 1.25, "right wrist in/out": 1.12,
+}  # fmt: skip
 BUTTONS = [(0.55, -0.20, 0.06), (0.62, -0.05, 0.06), (0.48, -0.28, 0.06)]
 
 
@@ -85,7 +90,9 @@ class WebTest(unittest.TestCase):
 
     @classmethod
     def executor_words(cls):
-        return "exemplar-executor", "--robot", ROBOT, "--scene", cls.scene, "--learning", cls.learning
+        # The browser draws with the same processors: what a robot's computer would wait for is not what is tested here.
+        patience = "--state-patience-s", "2", "--command-patience-s", "2", "--suit-patience-s", "0.5", "--dead-man-patience-s", "0.6"
+        return "exemplar-executor", "--robot", ROBOT, "--scene", cls.scene, "--learning", cls.learning, "--log-format", "json", *patience
 
     @classmethod
     def server(cls, program, *words, bus=True, listen="127.0.0.1:0"):
@@ -107,9 +114,12 @@ class WebTest(unittest.TestCase):
     def tool(self):
         return [float(word) for word in self.page("data")["tool"].split(",")]
 
+    def events(self, program, event):
+        lines = [line for file in sorted(self.folder.glob(f"{program}-*.log")) for line in file.read_text().splitlines()]
+        return sum(1 for line in lines if line.startswith("{") and line.endswith("}") and json.loads(line)["event"] == event)
+
     def clicks(self):
-        log = (self.folder / "exemplar-simulator-0.log").read_text()
-        return sum(1 for line in log.splitlines() if line.startswith("{") and json.loads(line)["event"] == "button clicked")
+        return self.events("exemplar-simulator", "button clicked")
 
     def ready(self):
         """The robot free, at full speed, the object where it is seen."""
@@ -174,6 +184,55 @@ class WebTest(unittest.TestCase):
         said = page("says", of="#verdict", text="Done")
         self.assertIn("contact", said)
         wait_for(lambda: self.clicks() > before, "the simulated button to click")
+
+    def test_what_is_seen_to_move_is_followed(self):
+        page = self.page
+        self.ready()
+        page("click", of="#follow")
+        self.assertIn("where it will be", page("says", of="#follow-said", text="Execute meets it"))
+        self.assertFalse(page("enabled", of="#as-seen"))
+        seen = page("values", of="#objects input")
+        page("press", key="ArrowUp")  # nobody's to move now
+        self.assertEqual(page("values", of="#objects input"), seen)
+        before = int(page("data")["answers"])
+        page("grows", name="answers", than=before + 1)  # it is asked anew as it is seen
+        page("click", of="#plan")
+        page("says", of="#verdict", text="Free of collisions")
+        followed = self.events("exemplar-executor", "followed")
+        page("click", of="#execute")
+        wait_for(lambda: self.events("exemplar-executor", "followed") > followed, "the executor to have followed it", 60)
+        page("click", of="#follow")
+        page("hides", of="#follow-said")
+
+    def test_a_person_in_a_suit_drives_the_robot(self):
+        page = self.page
+        self.ready()
+        page("click", of="#teleop-box summary")
+        self.assertIn("Dead-man: not heard", page("says", of="#teleop-heard", text="Suit: not heard"))
+        page("click", of="#teleop-touch input")
+        page("click", of="#teleop-on")
+        page("says", of="#robot-state", text="teleoperating")
+        self.assertIn("Closing this page ends it", page("says", of="#robot-detail", text="press the dead-man"))
+        self.assertFalse(page("enabled", of="#execute"))
+        stood = self.tool()
+        wave = self.folder / "wave.csv"
+        rows = [["time_s", *(f"{name}_rad" for name in SUIT)]]
+        for k in range(300):
+            here = {**SUIT, "right shoulder in/out": 0.2 + 0.15 * (1 - math.cos(2 * math.pi * k / 100))}
+            rows.append([f"{k / 50:.3f}", *(f"{angle:.5f}" for angle in here.values())])
+        wave.write_text("\n".join(",".join(row) for row in rows) + "\n", encoding="utf-8")
+        self.programs.start("exemplar-capture-suit", "--replay", wave, "--dead-man")
+        page("says", of="#robot-detail", text="following")
+        page("says", of="#teleop-figures", text="behind")
+        wait_for(lambda: math.dist(self.tool(), stood) > 0.02, "the robot to move as the person does")
+        page("click", of="#teleop-off")
+        self.assertRegex(page("says", of="#teleop-said", text="Ended"), r"The robot followed for [0-9.]+ s of")
+        wait_for(lambda: page("enabled", of="#teleop-on"), "the robot to be free")
+        page("click", of="#teleop-on")
+        page("says", of="#robot-state", text="teleoperating")
+        page("press", key="Escape")
+        page("says", of="#teleop-said", text="protective stop")
+        page("click", of="#teleop-box summary")
 
     def test_what_cannot_be_reached_is_refused_with_its_reason(self):
         page = self.page
@@ -257,6 +316,36 @@ class WebTest(unittest.TestCase):
     def test_nothing_is_loaded_from_elsewhere_and_no_script_failed(self):
         told = self.page("problems")
         self.assertEqual(told, {"problems": [], "foreign": []})
+
+    # ---- a phone, and a station that has nothing yet ----
+
+    def test_a_narrow_window_holds_everything_and_the_stop_at_all_times(self):
+        page = self.page
+        page("size", width=360, height=700)
+        self.addCleanup(page, "size", width=1100, height=720)
+        self.assertLessEqual(page("overhang"), 0)
+        self.assertTrue(page("inWindow", of="#stop"))
+        page("toEnd")
+        self.assertTrue(page("inWindow", of="#stop"))
+
+    def test_a_gateway_with_nothing_behind_it_says_what_is_missing(self):
+        port_file = self.folder / "bare-http-port"
+        process, _ = self.server("exemplar-gateway", "--web", PAGE, "--http", "127.0.0.1:0", "--http-port-file", port_file)
+        self.addCleanup(process.wait, 20)
+        self.addCleanup(process.send_signal, signal.SIGTERM)
+        wait_for(lambda: port_file.exists() and port_file.read_text().strip(), "the HTTP port")
+        page = Browser()
+        self.addCleanup(page.end)
+        page("go", url=f"http://127.0.0.1:{port_file.read_text().strip()}/")
+        for place, option in (("#skill-line", "--learning"), ("#robot-detail", "--executor"), ("#record-line", "--recorder"), ("#view-said", "--robot")):
+            page("says", of=place, text=option)
+        for button in ("#plan", "#execute", "#as-seen", "#follow"):
+            self.assertFalse(page("enabled", of=button), button)
+        for hidden in ("#record-form", "#record-event", "#learn-box", "#teleop-box"):
+            self.assertFalse(page("shown", of=hidden), hidden)
+        page("press", key="Escape")
+        page("says", of="#verdict", text="STOP did not reach the executor")
+        self.assertEqual(page("problems"), {"problems": [], "foreign": []})
 
     # ---- a secured one ----
 

@@ -21,6 +21,14 @@ export function say(element: HTMLElement, text: string, kind: "" | "good" | "bad
   element.hidden = text === "";
 }
 
+/** Says that the gateway was not told of a service, and by which option it would be. */
+export function sayMissing(element: HTMLElement, service: string, option: string, rest = "."): void {
+  const text = `No ${service} is behind this gateway (${option})${rest}`;
+  if (element.textContent !== text) element.replaceChildren(`No ${service} is behind this gateway (`, make("code", "", option), `)${rest}`);
+  element.dataset["kind"] = "";
+  element.hidden = false;
+}
+
 export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }

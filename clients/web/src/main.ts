@@ -8,8 +8,9 @@ import { AskPanel } from "./panels/ask";
 import { RecordPanel } from "./panels/record";
 import { RobotPanel } from "./panels/robot";
 import { SkillPanel } from "./panels/skill";
+import { TeleopPanel } from "./panels/teleop";
 import { Recent, TimePlot } from "./plots";
-import type { Health, JointState, ObjectPose, PlanSample, RobotDescription, RobotStatus, SceneDescription, StatusSample, TopicSample } from "./types";
+import type { Health, JointState, ObjectPose, PlanSample, RobotDescription, RobotStatus, SceneDescription, Service, StatusSample, TopicSample } from "./types";
 import { View, type Layer } from "./view/view";
 
 const TOPICS = ["ircp/joint_state", "ircp/objects", "ircp/plan", "ircp/executor/status"];
@@ -23,7 +24,8 @@ class Page {
   private readonly robotPlot = new TimePlot(byId("robot-plot"), [{ label: "touch, N", colour: "--orange", scale: "n", least: 1 }, { label: "tool, m/s", colour: "--teal", scale: "v", least: 0.1 }]);
   private readonly recent = new Recent(2, 20);
   private readonly ask = new AskPanel(this.client, this.view, this.answerPlot);
-  private readonly robot = new RobotPanel(this.client, this.view, this.ask, this.answerPlot);
+  private readonly teleop = new TeleopPanel(this.client);
+  private readonly robot = new RobotPanel(this.client, this.view, this.ask, this.answerPlot, this.teleop);
   private readonly record = new RecordPanel(this.client);
   private readonly skills = new SkillPanel(this.client, {
     onChoose: (chosen) => this.ask.choose(chosen),
@@ -31,7 +33,8 @@ class Page {
     toolPath: (joints, rows) => this.view?.toolPath(joints, rows),
   });
   private readonly live = new Live(this.client, TOPICS, RATE_HZ);
-  private serving = new Map<string, boolean>();
+  /** As the gateway told; nothing while it does not answer. */
+  private serving: ReadonlyMap<string, boolean> | undefined;
   private gatewayAnswers = true;
   private robotDrawn = false;
   private lastTool: { x: number; y: number; z: number; at_s: number } | undefined;
@@ -43,14 +46,16 @@ class Page {
     this.live.onSample = (sample) => this.onSample(sample);
     this.live.onState = (problem) => this.tellView("live", this.gatewayAnswers ? problem : "");
     if (!(await this.enter())) return;
+    this.record.onTopics = (topics) => this.teleop.setTopics(topics);
+    await this.checkHealth();
     await this.loadRobot();
     void this.live.run();
-    await this.skills.refresh();
+    await this.skills.refresh(this.service("learning"));
     void this.every(1000, () => this.askRobot());
-    void this.every(1000, () => this.record.refresh(this.serving.get("recorder") !== false));
+    void this.every(1000, () => this.record.refresh(this.service("recorder")));
     void this.every(1000, () => this.record.refreshTopics());
     void this.every(2000, () => this.checkHealth());
-    void this.every(5000, () => this.skills.refresh());
+    void this.every(5000, () => this.skills.refresh(this.service("learning")));
     setInterval(() => this.drawFigures(), 500);
   }
 
@@ -94,6 +99,7 @@ class Page {
     try {
       const scene = await this.client.get<SceneDescription>("/robot/scene.json");
       this.view?.setScene(scene.bodies);
+      this.teleop.setObjects(scene.bodies.filter((body) => body.kind !== "obstacle").map((body) => body.name));
     } catch (error) {
       if (!(error instanceof CallError && error.code === "not_found")) this.tellView("scene", `The place of work cannot be drawn: ${explain(error)}`);
     }
@@ -152,7 +158,10 @@ class Page {
   // ---- what is asked ----
 
   private async askRobot(): Promise<void> {
-    if (this.serving.get("executor") === false) {
+    const service = this.service("executor");
+    this.robot.setOffered(service !== "absent");
+    if (service === "absent") return;
+    if (service === "silent") {
       this.robot.setState(undefined, "The executor does not answer; the robot holds or is stopped by itself.", "");
       return;
     }
@@ -176,7 +185,7 @@ class Page {
       if (back) await this.recover();
     } catch (error) {
       this.gatewayAnswers = false;
-      this.serving.clear();
+      this.serving = undefined;
       say(byId("banner"), `${explain(error)} What is shown is what it said last. Trying again…`, "bad");
       this.showServices(undefined);
     }
@@ -196,7 +205,14 @@ class Page {
     say(byId("banner"), "");
     this.live.renew();
     if (!this.robotDrawn) await this.loadRobot();
-    await this.skills.refresh();
+    await this.skills.refresh(this.service("learning"));
+  }
+
+  /** While nobody says so, a service is taken to be there: asking it tells what is wrong. */
+  private service(name: string): Service {
+    if (this.serving === undefined) return "serving";
+    const serving = this.serving.get(name);
+    return serving === undefined ? "absent" : serving ? "serving" : "silent";
   }
 
   private tellLoggedOut(): void {
@@ -209,7 +225,7 @@ class Page {
 
   private showServices(health: Health | undefined): void {
     const entries = [{ name: "gateway", serving: health !== undefined, address: location.host }, ...(health?.backends ?? [])];
-    this.serving = new Map(entries.map((entry) => [entry.name, entry.serving]));
+    if (health !== undefined) this.serving = new Map(entries.map((entry) => [entry.name, entry.serving]));
     byId("services").replaceChildren(...entries.map((entry) => {
       const item = make("li", "", entry.serving ? entry.name : `${entry.name} does not answer`);
       item.dataset["kind"] = entry.serving ? "good" : "bad";

@@ -53,7 +53,7 @@ export class TimePlot {
       series.push({ label: curve.label, scale: curve.scale, stroke: css(curve.colour), width: 1.6, points: { show: false } });
     });
     const options: uPlot.Options = {
-      ...this.size(), scales, axes, series, cursor: { show: false }, legend: { show: false }, padding: [4, 2, 0, 2],
+      ...this.size(), scales, axes, series, cursor: { show: false }, legend: { show: false }, padding: [8, 2, 0, 2],
       hooks: { draw: [(plot) => this.drawMarks(plot)] },
     };
     this.plot = new uPlot(options, this.data, this.box);

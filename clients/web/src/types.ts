@@ -34,6 +34,13 @@ export interface ExecutionResult {
   state: string; detail: string; plan?: PlanSummary; tracking_error_rad: number; clearance_m: number; contact_error_m?: number;
   touch_max_n: number; tool?: PoseSeries;
 }
+export interface TeleoperationFeedback {
+  state: string; phase: string; detail: string; time_s: number; behind_rad: number; behind_joint: string; tracking_error_rad: number;
+  touch_n: number; clearance_m?: number; suit_rate_hz: number;
+}
+export interface TeleoperationResult {
+  state: string; detail: string; duration_s: number; following_s: number; holds: string; blocks: string; clearance_m?: number; touch_max_n: number;
+}
 export interface RobotStatus {
   state: string; detail: string; speed: number; joint_names: string[]; joints: number[]; state_age_s: number; tool?: Pose;
   objects: { object?: NamedPose; age_s: number }[];
@@ -47,6 +54,8 @@ export interface TopicInfo { topic: string; type: string; writers: number; recei
 export interface TopicSample { topic: string; json: string; json_error: string }
 export interface SubscribeMessage { samples?: TopicSample[]; missed?: string }
 
+/** What the gateway says of a service: not configured at all, or it does not answer. */
+export type Service = "absent" | "silent" | "serving";
 export interface Health { status: string; backends: { name: string; address: string; serving: boolean }[] }
 
 // Samples of topics, as their IDL has them.

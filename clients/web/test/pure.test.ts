@@ -6,8 +6,9 @@ import { bytes, mm, number, toNumber } from "../src/format";
 import { Backoff, LatestOnly } from "../src/latest";
 import { LineSplitter } from "../src/lines";
 import { base64, objectsOf } from "../src/panels/skill";
+import { judgeTeleoperation } from "../src/panels/teleop";
 import { blend, positionsOf, rowMaxima, thin, tube } from "../src/tube";
-import type { SkillReport } from "../src/types";
+import type { SkillReport, TeleoperationResult } from "../src/types";
 
 test("lines come whole wherever the pieces end, letters of several bytes too", () => {
   const splitter = new LineSplitter();
@@ -119,4 +120,11 @@ test("calls carry the page's token, streams end with their error, and a gateway 
   await rejects(client.call("SkillService/List"), { code: "unauthenticated" });
   equal(loggedOut, 1);
   await rejects(client.call("SkillService/List"), { code: "unavailable", unreachable: true });
+});
+
+test("how teleoperation ended is a sentence, with what happened in it", () => {
+  const result: TeleoperationResult = { state: "done", detail: "", duration_s: 20, following_s: 12.34, holds: "1", blocks: "0", touch_max_n: 3, clearance_m: 0.014 };
+  equal(judgeTeleoperation(result), "Ended. The robot followed for 12.3 s of 20.0 s, held 1 time; touch up to 3.0 N, 14.0 mm clear at the nearest.");
+  const stopped = judgeTeleoperation({ ...result, state: "protective_stop", detail: "stopped by a client", holds: "0", blocks: "2" });
+  equal(stopped.startsWith("protective stop: stopped by a client. The robot followed for 12.3 s of 20.0 s, blocked 2 times;"), true);
 });

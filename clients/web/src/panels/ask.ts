@@ -21,6 +21,7 @@ interface Question { chosen: Chosen; objects: NamedPose[]; start: Pose | undefin
 interface Sight { position: readonly number[]; quaternion: readonly number[] | undefined; at_ms: number }
 
 const FRESH_MS = 3000;
+const FOLLOWED_MS = 500;
 const AXES = ["x", "y", "z"] as const;
 
 /** Where the objects stand, by hand or as seen, and the skill's answer to it, live. */
@@ -34,10 +35,12 @@ export class AskPanel {
   private readonly said = byId("ask-said");
   private readonly fromHere = byId<HTMLInputElement>("from-here");
   private readonly asSeen = byId<HTMLButtonElement>("as-seen");
+  private readonly follow = byId<HTMLInputElement>("follow");
   private readonly places = new Map<string, Place>();
   private readonly latest: LatestOnly<Question>;
   private chosen: Chosen | undefined;
   private answers = 0;
+  private followed_ms = 0;
 
   constructor(
     private readonly client: Client,
@@ -48,6 +51,12 @@ export class AskPanel {
     if (view !== undefined) view.onMove = (name, position) => this.moved(name, position);
     this.fromHere.addEventListener("change", () => this.ask());
     this.asSeen.addEventListener("click", () => this.takeSeen());
+    this.follow.addEventListener("change", () => {
+      this.showPlaces();
+      this.takeSeen();
+      this.tellSights(performance.now());
+    });
+    this.tellSights(performance.now());
   }
 
   /** The skill that is asked; its objects go where they are seen, else where the trials had them. */
@@ -59,9 +68,12 @@ export class AskPanel {
       this.box.replaceChildren(make("p", "muted", "Choose or learn a skill first."));
       this.view?.setHandles(new Map());
       this.view?.setAnswer(undefined);
+      this.follow.checked = false;
+      this.tellSights(performance.now());
       return;
     }
     const names = chosen.objects.map((object) => object.name);
+    if (before?.name !== chosen.name) this.follow.checked = false;
     if (before?.name !== chosen.name || [...this.places.keys()].join() !== names.join()) {
       this.places.clear();
       this.box.replaceChildren();
@@ -76,27 +88,47 @@ export class AskPanel {
   }
 
   /** What to plan or execute; nothing without a skill. */
-  execution(): { skill: { name: string }; objects: NamedPose[] } | undefined {
-    return this.chosen === undefined ? undefined : { skill: { name: this.chosen.name }, objects: this.objects() };
+  execution(): { skill: { name: string }; objects?: NamedPose[]; follow?: boolean } | undefined {
+    if (this.chosen === undefined) return undefined;
+    const skill = { name: this.chosen.name };
+    return this.follow.checked ? { skill, follow: true } : { skill, objects: this.objects() };
   }
 
   ask(): void {
-    if (this.chosen === undefined) return;
     this.onQuestion();
+    this.send();
+  }
+
+  private send(): void {
+    if (this.chosen === undefined) return;
     const start = this.fromHere.checked ? this.tool : undefined;
     this.latest.ask({ chosen: this.chosen, objects: this.objects(), start, asked_ms: performance.now() });
   }
 
-  /** An object was seen; one that nobody has moved here yet goes there. */
+  /** An object was seen; one that is followed, or that nobody has moved here yet, goes there. */
   see(name: string, position: readonly number[], quaternion: readonly number[] | undefined): void {
-    this.sights.set(name, { position, quaternion, at_ms: performance.now() });
-    if (this.places.get(name)?.touched === false) this.takeSeen();
+    const now_ms = performance.now();
+    this.sights.set(name, { position, quaternion, at_ms: now_ms });
+    const place = this.places.get(name);
+    if (place?.touched === false) this.takeSeen();
+    if (place === undefined || !this.follow.checked || now_ms - this.followed_ms < FOLLOWED_MS) return;
+    this.followed_ms = now_ms;
+    this.goToSights();
+    this.showInputs();
+    this.send();
   }
 
-  /** Whether there are objects to take from where they are seen. */
+  /** Whether there are objects to take from where they are seen, or to follow. */
   tellSights(now_ms: number): void {
-    const seen = [...this.places.keys()].filter((name) => now_ms - (this.sights.get(name)?.at_ms ?? -1e9) < FRESH_MS);
-    this.asSeen.disabled = seen.length === 0;
+    const isSeen = (name: string): boolean => now_ms - (this.sights.get(name)?.at_ms ?? -1e9) < FRESH_MS;
+    const names = [...this.places.keys()];
+    const following = this.follow.checked;
+    this.box.classList.toggle("followed", following);
+    this.asSeen.disabled = following || !names.some(isSeen);
+    this.follow.disabled = names.length === 0;
+    const unseen = names.filter((name) => !isSeen(name));
+    const text = unseen.length > 0 ? `Not seen now: ${unseen.join(", ")}. Execute needs to see what it follows.` : "Execute meets it where it will be at the touch.";
+    say(byId("follow-said"), following ? text : "", unseen.length > 0 ? "warn" : "");
   }
 
   private addPlace(object: NamedPose): void {
@@ -122,7 +154,7 @@ export class AskPanel {
       return input;
     });
     const labels = inputs.map((input, i) => make("label", "", AXES[i] ?? "", input));
-    this.box.append(make("div", "object", make("h3", "", object.name, make("span", "muted", " in m; drag it, Shift lifts")), ...labels));
+    this.box.append(make("div", "object", make("h3", "", object.name, make("span", "muted", " in m", make("span", "by-hand", "; drag it, Shift lifts"))), ...labels));
     this.places.set(object.name, { position, rotation: fresh ? rotationOf(sight) : undefined, inputs, touched: fresh });
   }
 
@@ -136,6 +168,12 @@ export class AskPanel {
   }
 
   private takeSeen(): void {
+    this.goToSights();
+    this.showPlaces();
+    this.ask();
+  }
+
+  private goToSights(): void {
     for (const [name, place] of this.places) {
       const sight = this.sights.get(name);
       if (sight === undefined) continue;
@@ -143,8 +181,6 @@ export class AskPanel {
       place.rotation = rotationOf(sight);
       place.touched = true;
     }
-    this.showPlaces();
-    this.ask();
   }
 
   private showPlaces(): void {
@@ -152,13 +188,15 @@ export class AskPanel {
     this.showHandles();
   }
 
+  /** What is followed is nobody's to drag. */
   private showHandles(): void {
-    this.view?.setHandles(new Map([...this.places].map(([name, place]) => [name, place.position])));
+    this.view?.setHandles(this.follow.checked ? new Map() : new Map([...this.places].map(([name, place]) => [name, place.position])));
   }
 
   private showInputs(): void {
     for (const place of this.places.values()) {
       place.inputs.forEach((input, i) => {
+        input.readOnly = this.follow.checked;
         if (input === document.activeElement && input.valueAsNumber === place.position.getComponent(i)) return;
         input.value = place.position.getComponent(i).toFixed(3);
       });

@@ -1,8 +1,8 @@
 import type { Client } from "../client";
-import { byId, make, say, setText, table } from "../dom";
+import { byId, make, say, sayMissing, setText, table } from "../dom";
 import { CallError, explain } from "../errors";
 import { bytes, number, seconds, toNumber, words } from "../format";
-import type { RecorderStatus, TopicInfo } from "../types";
+import type { RecorderStatus, Service, TopicInfo } from "../types";
 
 interface Recordings { recordings: { name: string; bytes: number; written_s: number }[] }
 
@@ -14,6 +14,9 @@ export class RecordPanel {
   private readonly name = byId<HTMLInputElement>("record-name");
   private state = "";
   private listed_ms = -1e9;
+  private absent = false;
+  /** Told what flows, each time it was asked. */
+  onTopics: (topics: readonly TopicInfo[]) => void = () => undefined;
 
   constructor(private readonly client: Client) {
     byId<HTMLFormElement>("record-form").addEventListener("submit", (event) => {
@@ -27,9 +30,11 @@ export class RecordPanel {
     this.showState();
   }
 
-  /** Asks the recorder; undefined where it is known not to serve. */
-  async refresh(serving: boolean): Promise<void> {
-    if (!serving) {
+  /** Asks the recorder, where there is one. */
+  async refresh(service: Service): Promise<void> {
+    this.absent = service === "absent";
+    if (this.absent) sayMissing(this.line, "recorder", "--recorder");
+    if (service !== "serving") {
       this.setState("", "");
       return;
     }
@@ -45,6 +50,7 @@ export class RecordPanel {
     const box = byId("topics");
     try {
       const { topics } = await this.client.call<{ topics?: TopicInfo[] }>("TopicService/List", {}, AbortSignal.timeout(4000));
+      this.onTopics(topics ?? []);
       const shown = (topics ?? []).filter((topic) => topic.writers > 0 || toNumber(topic.received) > 0);
       const rows = shown.map((topic) => ({
         cells: [topic.topic.replace(/^ircp\//, ""), number(topic.rate_hz, topic.rate_hz < 10 ? 1 : 0), `${bytes(topic.bytes_per_s)}/s`, String(topic.lost)],
@@ -97,10 +103,11 @@ export class RecordPanel {
   }
 
   private showState(): void {
-    setText(this.stateBox, this.state === "" ? "not reached" : words(this.state));
-    this.stateBox.dataset["kind"] = this.state === "" ? "bad" : this.state === "recording" ? "busy" : "";
+    setText(this.stateBox, this.absent ? "none" : this.state === "" ? "not reached" : words(this.state));
+    this.stateBox.dataset["kind"] = this.absent ? "" : this.state === "" ? "bad" : this.state === "recording" ? "busy" : "";
     const active = this.state === "recording" || this.state === "paused";
-    byId("record-form").hidden = active;
+    byId("record-form").hidden = active || this.absent;
+    byId("record-event").hidden = this.absent;
     byId<HTMLButtonElement>("record-start").disabled = this.state === "";
     byId<HTMLButtonElement>("record-event").disabled = this.state === "";
     byId("record-stop").hidden = !active;

@@ -1,5 +1,5 @@
 import type { Client } from "../client";
-import { byId, make, say, setText } from "../dom";
+import { byId, make, say, sayMissing, setText } from "../dom";
 import { CallError, explain, isAbort } from "../errors";
 import { mm, number, seconds, words } from "../format";
 import { LatestOnly } from "../latest";
@@ -8,6 +8,7 @@ import { positionsOf } from "../tube";
 import type { ExecutionFeedback, ExecutionResult, PlanSummary, RobotStatus } from "../types";
 import type { View } from "../view/view";
 import type { AskPanel } from "./ask";
+import type { TeleopPanel } from "./teleop";
 
 const MOVING = ["planning", "ready", "executing", "paused", "teleoperating"];
 const STOPPED = ["protective_stop", "emergency_stop"];
@@ -16,7 +17,9 @@ const STOPPED = ["protective_stop", "emergency_stop"];
 export class RobotPanel {
   /** "executing", ...; empty: not known. */
   state = "";
+  private why = "";
   private holder = "";
+  private absent = false;
   private readonly stateBox = byId("robot-state");
   private readonly detail = byId("robot-detail");
   private readonly verdict = byId("verdict");
@@ -33,6 +36,7 @@ export class RobotPanel {
     private readonly view: View | undefined,
     private readonly ask: AskPanel,
     private readonly plot: TimePlot,
+    private readonly teleop: TeleopPanel,
   ) {
     this.speeds = new LatestOnly((factor) => this.order("SetSpeed", { factor }));
     byId("plan").addEventListener("click", () => void this.plan());
@@ -51,6 +55,7 @@ export class RobotPanel {
     ask.onQuestion = () => {
       if (!this.isMoving()) say(this.verdict, "");
     };
+    teleop.onHeld = () => this.showState();
     this.showState();
   }
 
@@ -62,12 +67,16 @@ export class RobotPanel {
   setState(state: string | undefined, detail: string, holder: string): void {
     const before = this.state;
     this.state = state ?? "";
+    this.why = detail;
     this.holder = holder;
-    if (state === "executing" && before !== "executing" && before !== "paused") this.view?.beginTrail();
+    const begins = (state === "executing" && before !== "paused") || state === "teleoperating";
+    if (begins && state !== before) this.view?.beginTrail();
     const stopped = STOPPED.includes(this.state) || this.state === "aborted";
     const why = state === undefined ? detail : detail === "" ? "" : words(detail);
     const hint = STOPPED.includes(this.state) ? "; reset when it is safe." : "";
-    say(this.detail, stopped || state === undefined ? `${why || words(this.state)}${hint}` : this.isMoving() ? this.heldBy() : "", stopped || state === undefined ? "bad" : "");
+    if (this.absent) return this.showState();
+    if (stopped || state === undefined) say(this.detail, `${why || words(this.state)}${hint}`, "bad");
+    else say(this.detail, this.isMoving() ? this.heldBy(why) : "", why.startsWith("following") ? "good" : why.startsWith("blocked") ? "warn" : "");
     this.showState();
   }
 
@@ -76,7 +85,7 @@ export class RobotPanel {
       this.speed.value = String(status.speed);
       this.showSpeed(status.speed);
     }
-    if (status.state !== this.state) this.setState(status.state, status.detail, this.holder);
+    if (status.state !== this.state || status.detail !== this.why) this.setState(status.state, status.detail, this.holder);
     if (!status.joint_names?.length) say(this.detail, "The executor has not heard the robot yet.", "warn");
   }
 
@@ -92,7 +101,16 @@ export class RobotPanel {
     }
   }
 
-  private heldBy(): string {
+  /** Whether there is an executor to ask; what the station's tells by itself is shown without as well. */
+  setOffered(offered: boolean): void {
+    if (this.absent === !offered) return;
+    this.absent = !offered;
+    if (this.absent) sayMissing(this.detail, "executor", "--executor", ": from here the robot is looked at, not moved.");
+    this.showState();
+  }
+
+  private heldBy(doing: string): string {
+    if (this.state === "teleoperating") return `${doing || "It is teleoperated"}. ${this.teleop.isOurs ? "Closing this page ends it and holds the robot." : "Someone else turned it on."}`;
     if (this.ours !== undefined) return "This page moves the robot; closing it slows the robot down and holds it.";
     return this.holder === "" ? "Someone else moves the robot." : `The robot belongs to ${this.holder}.`;
   }
@@ -185,16 +203,19 @@ export class RobotPanel {
   }
 
   private showState(): void {
-    setText(this.stateBox, this.state === "" ? "not reached" : words(this.state));
-    this.stateBox.dataset["kind"] = this.state === "" || STOPPED.includes(this.state) || this.state === "aborted" ? "bad" : MOVING.includes(this.state) && this.state !== "ready" ? "busy" : "good";
+    setText(this.stateBox, this.state !== "" ? words(this.state) : this.absent ? "none" : "not reached");
+    this.stateBox.dataset["kind"] = this.absent && this.state === "" ? "" : this.state === "" || STOPPED.includes(this.state) || this.state === "aborted" ? "bad" : MOVING.includes(this.state) && this.state !== "ready" ? "busy" : "good";
     const moving = this.isMoving();
-    const free = this.ours === undefined && !this.planning && !moving && this.state !== "planning";
+    const free = !this.absent && this.ours === undefined && !this.teleop.isOurs && !this.planning && !moving && this.state !== "planning";
+    this.teleop.setRobot(this.state === "teleoperating", free && this.state !== "" && !STOPPED.includes(this.state));
+    this.speed.disabled = this.absent || this.state === "";
     byId<HTMLButtonElement>("plan").disabled = !free || this.state === "";
     byId<HTMLButtonElement>("execute").disabled = !free || this.state === "" || STOPPED.includes(this.state);
-    byId("pause").hidden = this.state !== "executing";
-    byId("resume").hidden = this.state !== "paused";
-    byId("cancel").hidden = !moving && this.state !== "planning";
-    byId("reset").hidden = !STOPPED.includes(this.state) && this.state !== "aborted";
+    byId("teleop-box").hidden = this.absent;
+    byId("pause").hidden = this.absent || this.state !== "executing";
+    byId("resume").hidden = this.absent || this.state !== "paused";
+    byId("cancel").hidden = this.absent || this.state === "teleoperating" || (!moving && this.state !== "planning");
+    byId("reset").hidden = this.absent || (!STOPPED.includes(this.state) && this.state !== "aborted");
   }
 }
 

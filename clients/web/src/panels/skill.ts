@@ -1,9 +1,9 @@
 import type { Client } from "../client";
-import { byId, make, say, setText, table } from "../dom";
+import { byId, make, say, sayMissing, setText, table } from "../dom";
 import { explain, isAbort } from "../errors";
 import { cm, mm, number, seconds, words } from "../format";
 import { positionsOf, thin } from "../tube";
-import type { NamedPose, Progress, ScalarSeries, SkillInfo, SkillReport, Trial, TrialInfo } from "../types";
+import type { NamedPose, Progress, ScalarSeries, Service, SkillInfo, SkillReport, Trial, TrialInfo } from "../types";
 
 const TRIALS_DRAWN = 24;
 const POINTS_A_TRIAL = 240;
@@ -56,8 +56,14 @@ export class SkillPanel {
     this.files.addEventListener("change", () => void this.submit());
   }
 
-  /** Asks again; quiet where nothing changed. */
-  async refresh(): Promise<void> {
+  /** Asks again, where there is somebody to ask; quiet where nothing changed. */
+  async refresh(service: Service = "serving"): Promise<void> {
+    byId("learn-box").hidden = byId("skill-row").hidden = service === "absent";
+    if (service === "absent") {
+      sayMissing(this.line, "learning service", "--learning");
+      await this.choose("");
+      return;
+    }
     try {
       const [skills, trials] = await Promise.all([
         this.client.call<{ skills?: SkillInfo[] }>("SkillService/List"),

@@ -16,6 +16,7 @@ const STEP_M = 0.01;
 const ONE_LABEL_M = 0.03;
 const FARTHEST_M = 3;
 const TRAIL_MS = 120;
+const TRAIL_POINTS = 4000;
 
 /** Whether WebGL is reckoned by the processor here: then smooth edges cost more than they are worth. */
 function isSoftware(): boolean {
@@ -180,6 +181,7 @@ export class View {
     const last = new THREE.Vector3(this.trail[n - 3] ?? 1e9, this.trail[n - 2] ?? 0, this.trail[n - 1] ?? 0);
     if (last.distanceTo(position) < 5e-4) return;
     this.trail.push(position.x, position.y, position.z);
+    if (this.trail.length > 3 * TRAIL_POINTS) this.trail.splice(0, 3 * (TRAIL_POINTS / 4)); // teleoperation has no end
     this.trailGrew = true;
     this.touch();
   }
