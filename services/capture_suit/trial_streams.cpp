@@ -44,7 +44,7 @@ Status TrialStreams::Open(ircp::Bus& bus, const ircp::TrialSample& sample) {
 }
 
 Status TrialStreams::Play(const ircp::TrialSamples& trial, double rate, const Clock& clock,
-                          std::stop_token stop) {
+                          const std::stop_token& stop) {
   if (trial.samples.empty()) return {};
   const Duration start = clock.Steady();
   const Stamp first = ircp::StampOf(trial.samples.front());
@@ -53,7 +53,7 @@ Status TrialStreams::Play(const ircp::TrialSamples& trial, double rate, const Cl
     if (!clock.SleepUntil(start + FromSeconds(since_first / rate), stop)) {
       return Error{ErrorCode::kCancelled, "stopped before the trial had ended"};
     }
-    const Status written = std::visit(
+    Status written = std::visit(
         [&]<class Sample>(const Sample& value) {
           return std::get<WriterPtr<Sample>>(writers_)->Write(value);
         },

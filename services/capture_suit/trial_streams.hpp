@@ -23,7 +23,7 @@ class TrialStreams {
   /// stamps themselves stay, so that a recording keeps the true timing. kCancelled when `stop` came
   /// first.
   Status Play(const ircp::TrialSamples& trial, double rate, const Clock& clock,
-              std::stop_token stop);
+              const std::stop_token& stop);
 
   /// Precondition: a trial had suit samples.
   Status Send(const ircp::SuitSample& sample) {
