@@ -403,6 +403,40 @@ TEST_F(InStepNetwork, IsNotHeldUpByASampleThatNeverComes) {
   EXPECT_EQ(program.clock->Steady(), milliseconds(1));
 }
 
+TEST_F(InStepNetwork, WaitsForTheFirstSampleOfAWriterThatCameWhileTimeStood) {
+  Program program;
+  program.clock = MakeClock("program", {.input_patience = std::chrono::minutes(1)});
+  program.bus = std::make_unique<InStepBus>(bus_, bus_, nullptr, *program.clock);
+  const auto leader = MakeLeader({.in_step_with = {"program"}});
+  std::atomic<std::int64_t> received_ns{-1};
+  const auto reader = *program.bus->MakeReader<JointStateSample>(
+      [&](const JointStateSample&, const Reception& from) {
+        received_ns = (from.received - Stamp()).count();
+      });
+  const auto lead = [&](int ms, std::uint64_t sent) {
+    return leader->Lead(milliseconds(ms), Stamp() + milliseconds(ms),
+                        {{JointStateSample::kTopic, kRobotSource, sent}}, kAllHasCome, {});
+  };
+  ASSERT_TRUE(lead(0, 0));
+  ASSERT_TRUE(lead(1, 0));
+  const auto states = *bus_.MakeWriter<JointStateSample>(kRobotSource);
+  ASSERT_TRUE(lead(1, 0));  // it stands
+  std::atomic<int> said{0};
+  bus_.LoseWhere([&](const std::string& topic, const Header& header) {
+    if (topic == ClockSample::kTopic && header.source == "simulator") ++said;
+    return false;
+  });
+  std::atomic<bool> has_led{false};
+  std::jthread leading([&] { has_led = lead(2, 1); });
+  // The leader says the time again while it is not reached.
+  ASSERT_TRUE(Eventually([&] { return said >= 3 || has_led; }));
+  EXPECT_FALSE(has_led);
+  ASSERT_TRUE(states->Write({}).ok());
+  leading.join();
+  EXPECT_TRUE(has_led);
+  EXPECT_EQ(Duration(received_ns.load()), milliseconds(2));
+}
+
 TEST_F(InStepNetwork, AcknowledgesOnceReadersInStepHaveTheSamples) {
   Program program;
   program.clock = MakeClock("program", {.patience = milliseconds(1)});

@@ -211,6 +211,7 @@ class Follower final : public NetworkClock {
       }
       const bool goes_on = told.time + offset_ > steady_ || !has_time_;
       if (goes_on && is_complete && !WaitForMail(lock, told.sent, stop)) return;
+      if (!goes_on) NoteMatched(lock, told.sent);
       if (told.time != told_.time) continue;  // another leader, meanwhile
       if (goes_on) {
         SetTime(told);
@@ -277,6 +278,13 @@ class Follower final : public NetworkClock {
     const Stamp now = now_;
     lock.unlock();
     mail_.Open(now);
+    lock.lock();
+  }
+
+  /// While time stands others may come that we read from: what they send first is not missed.
+  void NoteMatched(std::unique_lock<std::mutex>& lock, const std::vector<TopicCount>& sent) {
+    lock.unlock();
+    mail_.NoteMatched(sent);
     lock.lock();
   }
 

@@ -140,7 +140,7 @@ void StepMail::Learn(const std::vector<TopicCount>& counts) {
   }
 }
 
-bool StepMail::HasCome(const std::vector<TopicCount>& counts) {
+void StepMail::NoteMatched(const std::vector<TopicCount>& counts) {
   std::map<int, std::shared_ptr<Question<int>>> unheard;
   {
     const std::lock_guard lock(mutex_);
@@ -149,8 +149,6 @@ bool StepMail::HasCome(const std::vector<TopicCount>& counts) {
         if (count.topic != reader.topic) continue;
         const Box& box = reader.boxes[count.source];
         if (box.last == 0 && !box.is_matched) unheard[id] = reader.matched_writers;
-        const bool is_awaited = box.last > 0 || box.is_matched;
-        if (is_awaited && count.sent > std::max(box.last, box.baseline)) return false;
       }
     }
   }
@@ -166,6 +164,21 @@ bool StepMail::HasCome(const std::vector<TopicCount>& counts) {
       box.is_matched = true;
     }
   }
+}
+
+bool StepMail::HasCome(const std::vector<TopicCount>& counts) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto& [id, reader] : readers_) {
+      for (const TopicCount& count : counts) {
+        if (count.topic != reader.topic) continue;
+        const Box& box = reader.boxes[count.source];
+        const bool is_awaited = box.last > 0 || box.is_matched;
+        if (is_awaited && count.sent > std::max(box.last, box.baseline)) return false;
+      }
+    }
+  }
+  NoteMatched(counts);
   return true;
 }
 

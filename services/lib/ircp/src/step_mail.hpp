@@ -45,6 +45,9 @@ class StepMail {
   // ---- the clock's side; one thread ----
   /// Who is in step, from now on.
   void Learn(const std::vector<TopicCount>& counts);
+  /// Who is heard by now, while nothing beyond these counts has been sent: their next sample is
+  /// waited for, be it the first.
+  void NoteMatched(const std::vector<TopicCount>& counts);
   /// Whether everything up to these counts has come, but for what came before we read.
   bool HasCome(const std::vector<TopicCount>& counts);
   /// What has not come by now will not.
