@@ -182,7 +182,7 @@ class Robot:
             simulator = system.start("simulator", "--robot", self.model, "--scene", scene, "--cameras", "off", "--log-format", "json", *pace)
             executor = system.start("executor", "--robot", self.model, "--scene", scene, "--learning", self.learning, *clock, *self.guard, server=True)
             address = executor.address()
-            wait_until("the robot's joint state", lambda: system.cli(address, "robot", "status").get("joint_names"), 20)
+            wait_until("the robot's joint state", lambda: system.cli(address, "robot", "status").get("joint_names"), 60)
             try:
                 done = system.cli(address, "skill", "execute", SKILL, "--object", "target=" + place.words(), "--wait")
             except Failure as failure:

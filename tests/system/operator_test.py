@@ -373,7 +373,7 @@ class InMotionTest(unittest.TestCase):
     def moving_executor(self, speed=0.2):
         """An executor in the middle of a motion, which goes on for long when it is slow."""
         # A simulator that a busy machine keeps from running for long is not what is tested here.
-        patient = ["--state-patience-s", "5", "--command-patience-s", "5"]
+        patient = ["--state-patience-s", "5", "--command-patience-s", "5", "--path-tolerance", "3"]
         executor = self.start("executor", *self.scene, "--learning", f"127.0.0.1:{self.learning.port()}", *patient, *self.station)
         seen = "exemplar_executor_joint_state_age_seconds"
         self.assertTrue(wait_for(lambda: executor.metrics().get(seen, 9) < 0.2), executor.lines())
