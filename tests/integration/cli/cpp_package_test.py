@@ -28,7 +28,7 @@ SCENE = ROOT / "deploy" / "config" / "rail_press.yaml"
 
 
 def run(*words, **options):
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=180, check=False, **options)
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=500, check=False, **options)
     assert done.returncode == 0, f"{words}: {done.stdout[-2000:]}{done.stderr[-4000:]}"
     return done.stdout
 
@@ -56,7 +56,7 @@ class PackageTest(unittest.TestCase):
 
     def example(self, name, *words, env=None):
         command = [str(word) for word in (self.built / name, *words)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=os.environ | (env or {}))
+        return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, env=os.environ | (env or {}))
 
     def test_it_learns_and_queries(self):
         learning, files, told = self.learning, self.files, self.told
