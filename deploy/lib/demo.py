@@ -162,7 +162,8 @@ class Demo:
 
     def execute(self, *arguments):
         self.say.step("planning and executing")
-        self.record("start", "--name", "execution")
+        # Once the recorder hears both, so that it has them whole.
+        self.record("start", "--name", "execution", "--topic", "ircp/joint_command", "--topic", "ircp/joint_state", "--wait", 60)
         try:
             result = self.system.cli(self.executor, "skill", "execute", SKILL, *arguments, "--wait")
         finally:

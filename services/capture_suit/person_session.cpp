@@ -13,7 +13,6 @@ namespace exemplar::capture_suit {
 namespace {
 
 constexpr const char* kSource = "suit";
-constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
 constexpr double kWayToStart = 1.0;                                     // s

@@ -14,7 +14,6 @@
 namespace exemplar::capture_suit {
 namespace {
 
-constexpr Duration kReaderTimeout = std::chrono::seconds(5);
 constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 
 }  // namespace

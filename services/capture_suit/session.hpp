@@ -8,6 +8,10 @@
 
 namespace exemplar::capture_suit {
 
+/// The first trial begins without those who have not come to read it by then: programs that were
+/// started at the same time are there sooner, on a busy machine too.
+inline constexpr Duration kReaderTimeout = std::chrono::seconds(10);
+
 /// What is waited for at a trial's end until every reader has all of it. Longer than a silent
 /// reader takes to count as gone (docs/topics.md), so that a link that is cut across the end loses
 /// nothing.

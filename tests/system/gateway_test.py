@@ -84,7 +84,7 @@ class GatewayTest(unittest.TestCase):
     # ---- an operator's work ----
 
     def test_an_operator_needs_one_address(self):
-        self.cli("record", "start", "--name", "through-the-gateway")
+        self.cli("record", "start", "--name", "through-the-gateway", "--topic", "ircp/joint_command", "--wait", "60")
         self.assertEqual(len(self.cli("trial", "list")), len(BUTTONS))
         motion = self.cli("skill", "query", "press", "--object", OBJECT)
         self.assertGreater(len(motion["time_s"]), 100)

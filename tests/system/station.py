@@ -100,8 +100,7 @@ class SimulatedStation:
     def press(self, skill, target):
         """The robot carries the skill out, recorded; the answer."""
         self.wait_until_time_stands()
-        self.recorder_knows("ircp/joint_command")
-        exemplar("record", "start", "--name", "execution", "--server", self.recorder)
+        exemplar("record", "start", "--name", "execution", "--topic", "ircp/joint_command", "--wait", "60", "--server", self.recorder)
         with self.timed():
             done = exemplar("--server", self.executor, "skill", "execute", skill, "--object", target, "--wait")
         exemplar("record", "stop", "--server", self.recorder)

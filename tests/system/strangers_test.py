@@ -70,7 +70,7 @@ class StrangersTest(unittest.TestCase):
             self.record(kind, schema=schema)
             original, again = (self.folder / "data" / f"{name}.mcap" for name in (kind, f"{kind}-again"))
             exemplar("record", "start", "--name", f"{kind}-again", "--server", self.server)
-            played = exemplar("record", "replay", original, "--rate", "10", "--domain", "95", "--station", "test")
+            played = exemplar("record", "replay", original, "--rate", "10", "--wait", "60", "--domain", "95", "--station", "test")
             exemplar("record", "stop", "--server", self.server)
             self.assertEqual(played["refused"], 0)
             topic = f"lab/{kind}"
