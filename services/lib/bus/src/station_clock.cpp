@@ -1,8 +1,16 @@
 #include "exemplar/bus/station_clock.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace exemplar::bus {
+namespace {
+
+/// Longer than a busy machine keeps a thread from running, and shorter than the leader waits for
+/// the whole program.
+constexpr Duration kPatience = std::chrono::seconds(8);
+
+}  // namespace
 
 Result<StationClock> StationClock::Create(const std::string& kind, ParticipantOptions& network,
                                           const std::string& name, std::stop_token stop) {
@@ -17,7 +25,8 @@ Result<StationClock> StationClock::Create(const std::string& kind, ParticipantOp
     auto participant = Participant::Create(std::move(own));
     if (!participant.ok()) return participant.error();
     clock.participant_ = std::move(*participant);
-    auto followed = ircp::NetworkClock::Create(*clock.participant_, name, {.is_complete = false});
+    auto followed = ircp::NetworkClock::Create(*clock.participant_, name,
+                                               {.patience = kPatience, .is_complete = false});
     if (!followed.ok()) return followed.error();
     clock.network_ = std::move(*followed);
     if (!clock.network_->WaitForLeader(std::move(stop))) {
