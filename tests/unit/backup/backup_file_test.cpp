@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "exemplar/backup/tar.hpp"
 #include "exemplar/security/digest.hpp"
 
 namespace exemplar::backup {
@@ -121,6 +122,33 @@ TEST_F(BackupFileTest, IsNotMadeOfLessThanWasAnnounced) {
   ASSERT_FALSE(manifest.ok());
   EXPECT_THAT(manifest.error().message, HasSubstr("5 bytes of 9"));
   EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(BackupFileTest, RefusesAManifestWhoseNumbersAreNone) {
+  const auto verify = [&](const std::string& made, const std::string& schema,
+                          const std::string& count) {
+    const std::string text =
+        R"({"format": "exemplar-backup", "format_version": 1, "program": "", "made_ns": )" + made +
+        R"(, "services": [{"service": "recorder", "schema": )" + schema +
+        R"(, "parts": 0, "bytes": 0, "counts": {"trials": )" + count +
+        R"(}, "notices": []}], "parts": []})";
+    fs::remove(file_);
+    const auto tar = TarWriter::Create(file_);
+    EXPECT_TRUE((*tar)->Begin("manifest.json", text.size(), 0).ok());
+    EXPECT_TRUE((*tar)->Write(text).ok());
+    EXPECT_TRUE((*tar)->Finish().ok());
+    return Verify(file_, {});
+  };
+  ASSERT_TRUE(verify("7", "1", "2").ok());
+  for (const char* none : {"1.5", "1e300", "\"7\"", "null", "true"}) {
+    for (const auto& manifest :
+         {verify(none, "1", "2"), verify("7", none, "2"), verify("7", "1", none)}) {
+      ASSERT_FALSE(manifest.ok()) << none;
+      EXPECT_EQ(manifest.error().code, ErrorCode::kDataLoss);
+      EXPECT_THAT(manifest.error().message, HasSubstr("manifest.json: ")) << none;
+    }
+  }
+  EXPECT_FALSE(verify("7", "1", "-2").ok());
 }
 
 TEST_F(BackupFileTest, TellsWhoWasErased) {

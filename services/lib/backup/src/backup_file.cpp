@@ -16,6 +16,10 @@ constexpr const char* kManifest = "manifest.json";
 constexpr const char* kFormat = "exemplar-backup";
 constexpr int kFormatVersion = 1;
 
+// Of a number that is wanted whole, nlohmann would also take one with a fraction, or too large.
+std::int64_t WholeOf(const Json& json) { return json.get_ref<const Json::number_integer_t&>(); }
+std::uint64_t CountOf(const Json& json) { return json.get_ref<const Json::number_unsigned_t&>(); }
+
 std::string ToText(const Manifest& manifest) {
   Json services = Json::array();
   for (const api::BackupPlan& plan : manifest.services) {
@@ -49,7 +53,7 @@ Result<Manifest> FromText(const std::string& text, const std::string& file) {
   // nlohmann tells of missing and mistyped members by exceptions.
   try {
     if (json.at("format") != kFormat) return damaged("this is no backup of ours");
-    const int version = json.at("format_version");
+    const std::int64_t version = WholeOf(json.at("format_version"));
     if (version > kFormatVersion) {
       return FailedPrecondition(file + " has format " + std::to_string(version) +
                                     ", written by a newer program; this one knows up to " +
@@ -57,20 +61,23 @@ Result<Manifest> FromText(const std::string& text, const std::string& file) {
                                 "file");
     }
     Manifest manifest;
-    manifest.made = Stamp::FromNanoseconds(json.at("made_ns"));
+    manifest.made = Stamp::FromNanoseconds(WholeOf(json.at("made_ns")));
     manifest.program = json.at("program");
     for (const Json& service : json.at("services")) {
+      std::map<std::string, std::uint64_t> counts;
+      for (const auto& [name, count] : service.at("counts").items()) counts[name] = CountOf(count);
       manifest.services.push_back(
           {.service = service.at("service"),
-           .schema = service.at("schema"),
-           .parts = service.at("parts"),
-           .bytes = service.at("bytes"),
-           .counts = service.at("counts").get<std::map<std::string, std::uint64_t>>(),
+           .schema = static_cast<int>(WholeOf(service.at("schema"))),
+           .parts = CountOf(service.at("parts")),
+           .bytes = CountOf(service.at("bytes")),
+           .counts = std::move(counts),
            .notices = service.at("notices").get<std::vector<std::string>>()});
     }
     for (const Json& part : json.at("parts")) {
-      manifest.parts.push_back(
-          {.name = part.at("name"), .bytes = part.at("bytes"), .sha256 = part.at("sha256")});
+      manifest.parts.push_back({.name = part.at("name"),
+                                .bytes = CountOf(part.at("bytes")),
+                                .sha256 = part.at("sha256")});
     }
     return manifest;
   } catch (const Json::exception& e) {
@@ -338,7 +345,7 @@ Result<std::vector<api::ErasedPerson>> ReadErased(const std::filesystem::path& f
         for (const Json& person : *member != '\0' ? json.at(member) : json) {
           erased.push_back({.salt = person.at("salt"),
                             .hash = person.at("hash"),
-                            .erased = Stamp::FromNanoseconds(person.at("erased_ns"))});
+                            .erased = Stamp::FromNanoseconds(WholeOf(person.at("erased_ns")))});
         }
       } catch (const Json::exception& e) {
         return Error{ErrorCode::kDataLoss, file.string() + ": " + name + ": " + e.what(), "file"};

@@ -264,11 +264,11 @@ Result<std::optional<TarEntry>> TarReader::Next() {
       while (!left.empty()) {
         const std::size_t blank = left.find(' ');
         const auto length = ParseInteger(left.substr(0, std::min(blank, left.size())));
-        if (!length || *length <= static_cast<long long>(blank) + 1 ||
-            *length > static_cast<long long>(left.size())) {
+        const auto size = static_cast<std::size_t>(length.value_or(0));
+        if (blank == std::string_view::npos || length.value_or(-1) < 0 || size <= blank + 1 ||
+            size > left.size() || left[size - 1] != '\n') {
           return Damaged(begin, "the pax record here is damaged");
         }
-        const std::size_t size = static_cast<std::size_t>(*length);
         const std::string_view record = left.substr(blank + 1, size - blank - 2);
         if (record.starts_with("path=")) long_name = record.substr(5);
         if (record.starts_with("size=")) {
