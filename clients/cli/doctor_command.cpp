@@ -17,6 +17,7 @@
 #include "exemplar/ircp/clock_watch.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/health.hpp"
+#include "exemplar/security/station.hpp"
 #include "network_options.hpp"
 #include "screen.hpp"
 
@@ -82,6 +83,10 @@ Result<Evidence> Observe(const bus::ParticipantOptions& network, const Words& wo
                     .secured = !network.security.empty(),
                     .version = program::Version(),
                     .names = words.names};
+  if (evidence.secured) {
+    evidence.identity_warnings =
+        security::MemberFolderWarnings(network.security, SystemClock().Now());
+  }
   // Before there is anything of our own.
   std::set<int> domains = bus::DomainsOfThisMachine();
   domains.erase(network.domain);
@@ -283,6 +288,10 @@ int Doctor(const Session& session, const Words& words) {
     display.Clear();
     return evidence.error().code == ErrorCode::kInvalidArgument ? FailUsage(evidence.error())
                                                                 : Fail(evidence.error());
+  }
+  if (signals.token().stop_requested()) {
+    display.Clear();
+    return Interrupted("nothing was looked at for long enough");
   }
   std::vector<std::string> services = words.services;
   if (!session.server.empty()) services.insert(services.begin(), session.server);

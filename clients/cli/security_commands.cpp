@@ -1,6 +1,7 @@
 // Certificates, permissions and tokens of a station, on the machine that keeps its authority: no
 // server is asked.
 
+#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -115,20 +116,29 @@ int Token(const Words& words) {
 int List(const Words& words) {
   const auto members = security::ListMembers(words.folder);
   if (!members) return Fail(members.error());
+  const Stamp now = SystemClock().Now();
   nlohmann::json list = nlohmann::json::array();
-  Table table({"MEMBER", "ROLE", "UNTIL", "SERIAL"});
+  Table table({"MEMBER", "ROLE", "UNTIL", "DAYS LEFT", "SERIAL"});
+  std::vector<std::string> ending;
   for (const security::MemberInfo& member : *members) {
     const std::string until = ToIso8601(member.not_after).substr(0, 19) + "Z";
+    const double days = std::floor(security::DaysLeft(member.not_after, now));
     list.push_back({{"name", member.name},
                     {"role", member.role},
                     {"until", until},
+                    {"days_left", days},
                     {"serial", member.serial}});
-    table.Add({member.name, member.role, until, member.serial});
+    table.Add({member.name, member.role, until, FormatDouble(days), member.serial});
+    if (days < security::kFewDays) ending.push_back(member.name);
   }
   if (words.format == "json") {
     Print(list);
-  } else {
-    std::cout << table.Text();
+    return 0;
+  }
+  std::cout << table.Text();
+  if (!ending.empty()) {
+    std::cerr << "near the end or past it: " << Join(ending, ", ")
+              << "; issue them again, and start their programs with the new files\n";
   }
   return 0;
 }

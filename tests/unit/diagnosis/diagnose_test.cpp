@@ -143,6 +143,14 @@ TEST_F(DiagnoseTest, TellsThatAnIdentityWasRefused) {
   ExpectProblem("security", "refuse each other");
 }
 
+TEST_F(DiagnoseTest, WarnsOfTheObserversOwnIdentity) {
+  evidence_.identity_warnings = {"cert.pem counts for 9 more days"};
+  const Finding finding = First();
+  EXPECT_EQ(finding.severity, Severity::kWarning);
+  EXPECT_EQ(finding.cause, "security");
+  EXPECT_THAT(finding.what, HasSubstr("9 more days"));
+}
+
 TEST_F(DiagnoseTest, WarnsOfOneThatDidNotAnswerASecuredGreeting) {
   evidence_.secured = true;
   for (SeenParticipant& one : evidence_.discovery.participants) {

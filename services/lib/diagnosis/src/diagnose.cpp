@@ -126,6 +126,10 @@ class Judge {
   }
 
   void JudgeSecurity() {
+    for (const std::string& warning : evidence_.identity_warnings) {
+      Tell(Severity::kWarning, "security", "the observer's identity: " + warning,
+           "exemplar security list says who else is near the end (docs/security.md).");
+    }
     std::vector<const SeenParticipant*> secured, open;
     for (const SeenParticipant* one : here_) {
       if (!names_.Asked(one->id)) continue;

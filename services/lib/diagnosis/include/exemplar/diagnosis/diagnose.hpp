@@ -44,7 +44,9 @@ struct ServiceAnswer {
 struct Evidence {
   int domain = 0;  ///< that is asked about
   std::string station = "default";
-  bool secured = false;         ///< whether the observer has an identity
+  bool secured = false;  ///< whether the observer has an identity
+  /// What is wrong with it soon, a sentence each.
+  std::vector<std::string> identity_warnings{};
   std::string version{};        ///< of the observer
   ircp::Discovery discovery{};  ///< of all observed domains
   std::vector<ircp::SeenInterface> interfaces{};
