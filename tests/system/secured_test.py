@@ -73,7 +73,7 @@ class Wire:
 def demo(folder, files, *options):
     command = [sys.executable, ROOT / "deploy" / "lib" / "demo.py", "--headless", "--bin", BINARIES, "--rate", "3", "--keep", folder]
     command += ["--domain", "92", *options, "--trials", *files]
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=220)
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=500)
 
 
 def seen(packets, words):
@@ -137,6 +137,38 @@ class SecuredTest(unittest.TestCase):
         for command in commands:
             done = subprocess.run([BINARIES / "exemplar", *shlex.split(command)[1:]], cwd=folder, capture_output=True, text=True, timeout=60)
             self.assertEqual(done.returncode, 0, f"{command}: {done.stderr}")
+
+    def test_the_pages_packet_filter_keeps_strangers_from_the_stations_ports(self):
+        if not shutil.which("nft"):
+            self.skipTest("nftables is not installed")
+        page = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
+        member, other, stranger = "10.0.7.11", "10.0.7.19", "10.0.7.66"
+        for address in (member, other, stranger):
+            subprocess.run(["ip", "address", "add", f"{address}/32", "dev", "lo"], check=True)
+
+        def arrives(source, port):
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as of:
+                to.bind((member, port))
+                to.settimeout(0.3)
+                of.bind((source, 0))
+                of.sendto(b"RTPS", (member, port))
+                try:
+                    return to.recv(16) == b"RTPS"
+                except TimeoutError:
+                    return False
+
+        self.assertTrue(arrives(stranger, 7410))
+        rules = re.findall(r"^nft .*", page, re.MULTILINE)
+        self.assertEqual(len(rules), 3)
+        for rule in rules:
+            subprocess.run(shlex.split(rule), check=True)
+        try:
+            self.assertEqual([arrives(stranger, port) for port in (7400, 7410, 7649)], [False] * 3)
+            self.assertTrue(arrives(other, 7410))
+            # Others than the station may still answer what was asked of them.
+            self.assertTrue(arrives(stranger, 40000))
+        finally:
+            subprocess.run(["nft", "delete", "table", "inet", "station"], check=True)
 
     def test_audit_lines_say_who_moved_the_robot(self):
         log = (self.folder / "demo" / "logs" / "executor.log").read_text()
