@@ -142,6 +142,20 @@ TEST_F(StationTest, IssuingAgainRevokesTheOldCertificate) {
   EXPECT_TRUE(fs::exists(folder_ / "revoked" / (old + ".pem")));
 }
 
+TEST_F(StationTest, WhoWasGivenAFolderOwnsWhatIsIssuedAgain) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root gives files away";
+  const fs::path executor = Issue("executor", "executor");
+  constexpr uid_t kUser = 10001;
+  ASSERT_EQ(::chown(executor.c_str(), kUser, kUser), 0);
+  Issue("executor", "executor");
+  for (const fs::path& file :
+       {FilesOf(executor).key, FilesOf(executor).permissions, executor / "access.yaml"}) {
+    struct stat state {};
+    ASSERT_EQ(::stat(file.c_str(), &state), 0) << file;
+    EXPECT_EQ(state.st_uid, kUser) << file;
+  }
+}
+
 TEST_F(StationTest, TokensAreKeptAsHashesOnly) {
   const auto token = AddToken(folder_, "anna", {Role::kTeach}, 30, now_);
   ASSERT_TRUE(token.ok()) << token.error().message;
