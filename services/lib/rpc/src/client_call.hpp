@@ -62,6 +62,34 @@ Result<Response> Call(Connection& connection, Stub& stub,
   return response;
 }
 
+/// Reads a stream of whatever `tell` takes until its end; the last message, which holds the answer.
+template <class Response, class Tell>
+Result<Response> ReadToLast(const Connection& connection, grpc::ClientReader<Response>& reader,
+                            const Tell& tell) {
+  Response last;
+  Response response;
+  while (reader.Read(&response)) {
+    tell(response);
+    last.Swap(&response);
+  }
+  const grpc::Status status = reader.Finish();
+  if (!status.ok()) return FromGrpc(status, connection.address());
+  return last;
+}
+
+/// The report behind a stream of progress, which `progress` is told (none: nobody asks).
+template <class Response, class Progress>
+Result<Response> ReadReport(const Connection& connection, grpc::ClientReader<Response>& reader,
+                            const Progress& progress) {
+  Result<Response> last = ReadToLast(connection, reader, [&](const Response& response) {
+    if (response.has_progress() && progress) {
+      progress(response.progress().fraction(), response.progress().step());
+    }
+  });
+  if (last && !last->has_report()) return Internal(connection.address() + " sent no report");
+  return last;
+}
+
 /// Sends a message with the header, then the file's bytes in chunks.
 template <class Request>
 void Upload(grpc::ClientWriter<Request>& writer, const Request& header, std::string_view file) {

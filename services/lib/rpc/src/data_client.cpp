@@ -29,19 +29,10 @@ class DataClient final : public api::DataApi {
     request.set_dry_run(erase.dry_run);
     const auto context = connection_->Begin(Length::kLong);
     const CancelOnStop cancel(*context, std::move(stop));
-    const auto reader = stub_.ErasePerson(context.get(), request);
-    v1::ErasePersonResponse last;
-    v1::ErasePersonResponse response;
-    while (reader->Read(&response)) {
-      if (response.has_progress() && progress) {
-        progress(response.progress().fraction(), response.progress().step());
-      }
-      last.Swap(&response);
-    }
-    const grpc::Status status = reader->Finish();
-    if (!status.ok()) return FromGrpc(status, connection_->address());
-    if (!last.has_report()) return Internal(connection_->address() + " sent no report");
-    return FromProto(last.report());
+    const auto last =
+        ReadReport(*connection_, *stub_.ErasePerson(context.get(), request), progress);
+    if (!last) return last.error();
+    return FromProto(last->report());
   }
 
   Result<api::DataReport> ApplyRetention(const api::RetentionRequest& retention) override {

@@ -30,17 +30,7 @@ class ExecutorClient final : public api::ExecutorApi {
     request.set_detached(execution.detached);
     const auto context = connection_->Begin(Connection::Length::kLong);
     const CancelOnStop cancel(*context, std::move(stop));
-    const auto reader = stub_.Execute(context.get(), request);
-    v1::ExecuteResponse last;
-    v1::ExecuteResponse response;
-    while (reader->Read(&response)) {
-      if (response.has_feedback() && feedback) feedback(FromProto(response.feedback()));
-      last.Swap(&response);
-    }
-    const grpc::Status status = reader->Finish();
-    if (!status.ok()) return FromGrpc(status, connection_->address());
-    if (!last.has_result()) return Internal(connection_->address() + " sent no result");
-    return FromProto(last.result());
+    return ReadResult<api::ExecutionResult>(*stub_.Execute(context.get(), request), feedback);
   }
 
   Result<api::RobotStatus> GetStatus() override {
@@ -67,17 +57,8 @@ class ExecutorClient final : public api::ExecutorApi {
     ToProto(teleoperation, &request);
     const auto context = connection_->Begin(Connection::Length::kLong);
     const CancelOnStop cancel(*context, std::move(stop));
-    const auto reader = stub_.Teleoperate(context.get(), request);
-    v1::TeleoperateResponse last;
-    v1::TeleoperateResponse response;
-    while (reader->Read(&response)) {
-      if (response.has_feedback() && feedback) feedback(FromProto(response.feedback()));
-      last.Swap(&response);
-    }
-    const grpc::Status status = reader->Finish();
-    if (!status.ok()) return FromGrpc(status, connection_->address());
-    if (!last.has_result()) return Internal(connection_->address() + " sent no result");
-    return FromProto(last.result());
+    return ReadResult<api::TeleoperationResult>(*stub_.Teleoperate(context.get(), request),
+                                                feedback);
   }
   Status EndTeleoperation() override {
     return Do(&Stub::EndTeleoperation, v1::EndTeleoperationRequest());
@@ -89,6 +70,17 @@ class ExecutorClient final : public api::ExecutorApi {
     const auto response = Call(*connection_, stub_, method, request);
     if (!response) return response.error();
     return {};
+  }
+
+  /// The result behind a stream of feedback.
+  template <class Value, class Response, class Feedback>
+  Result<Value> ReadResult(grpc::ClientReader<Response>& reader, const Feedback& feedback) const {
+    const auto last = ReadToLast(*connection_, reader, [&](const Response& response) {
+      if (response.has_feedback() && feedback) feedback(FromProto(response.feedback()));
+    });
+    if (!last) return last.error();
+    if (!last->has_result()) return Internal(connection_->address() + " sent no result");
+    return FromProto(last->result());
   }
 
   std::shared_ptr<Connection> connection_;

@@ -27,19 +27,9 @@ class SkillClient final : public api::SkillApi {
     OptionsToProto(options, request.mutable_options());
     const auto context = connection_->Begin(Connection::Length::kLong);
     const CancelOnStop cancel(*context, std::move(stop));
-    const auto reader = stub_.Learn(context.get(), request);
-    v1::LearnSkillResponse last;
-    v1::LearnSkillResponse response;
-    while (reader->Read(&response)) {
-      if (response.has_progress() && progress) {
-        progress(response.progress().fraction(), response.progress().step());
-      }
-      last.Swap(&response);
-    }
-    const grpc::Status status = reader->Finish();
-    if (!status.ok()) return FromGrpc(status, connection_->address());
-    if (!last.has_report()) return Internal(connection_->address() + " sent no report");
-    return FromProto(last.report());
+    const auto last = ReadReport(*connection_, *stub_.Learn(context.get(), request), progress);
+    if (!last) return last.error();
+    return FromProto(last->report());
   }
 
   Result<std::vector<api::SkillInfo>> List() override {
