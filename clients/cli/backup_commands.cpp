@@ -85,7 +85,10 @@ int Create(const Session& session, const Words& words) {
     const auto sink = (*writer)->NextService(Showing(display, "copying " + service.name));
     const Status copied = service.api->Backup(*sink, signals.token());
     display.Clear();
-    if (!copied) return Fail(OfService(copied.error(), service.name));
+    if (!copied) {
+      return FailOrInterrupted(OfService(copied.error(), service.name), signals.token(),
+                               "there is no " + words.file);
+    }
   }
   const Result<backup::Manifest> manifest = (*writer)->Finish();
   if (!manifest) return Fail(manifest.error());

@@ -17,19 +17,61 @@ std::string Footer(const std::vector<std::string>& examples, const std::string& 
   return text + "\n\n" + notes + '\n';
 }
 
-/// Lists commands by the first line of what they say of themselves.
+/// Of what a command or an option says of itself the first sentence, without a stop.
+std::string Brief(const std::string& help) {
+  std::string brief = help.substr(0, help.find('\n'));
+  brief.erase(std::min(brief.find(". "), brief.size()));
+  if (brief.ends_with('.')) brief.pop_back();
+  return brief;
+}
+
+/// Lines of at most `width` characters, broken at blanks where they are longer.
+std::string Wrapped(const std::string& text, std::size_t width) {
+  std::string wrapped;
+  for (std::string_view line : Split(text, '\n')) {
+    while (line.size() > width) {
+      std::size_t cut = line.rfind(' ', width);
+      if (cut == std::string_view::npos || cut == 0) cut = line.find(' ', width);
+      if (cut == std::string_view::npos) break;
+      wrapped += std::string(line.substr(0, cut)) + '\n';
+      line.remove_prefix(cut + 1);
+    }
+    wrapped += std::string(line) + '\n';
+  }
+  wrapped.pop_back();
+  return wrapped;
+}
+
+/// Lists commands by the first sentence of what they say of themselves; defaults stand behind what
+/// an option says.
 class Formatter final : public CLI::Formatter {
  public:
   std::string make_subcommand(const CLI::App* command) const override {
-    const std::string description = command->get_description();
     std::stringstream out;
-    CLI::detail::format_help(out, command->get_name(),
-                             description.substr(0, description.find('\n')), column_width_);
+    CLI::detail::format_help(out, command->get_name(), Brief(command->get_description()),
+                             column_width_);
     return out.str();
   }
   std::string make_description(const CLI::App* command) const override {
-    return CLI::Formatter::make_description(command) + '\n';
+    return Wrapped(CLI::Formatter::make_description(command), kWidth) + '\n';
   }
+  std::string make_option_opts(const CLI::Option* option) const override {
+    std::string text;
+    if (option->get_type_size() != 0) {
+      if (!option->get_type_name().empty()) text += " " + option->get_type_name();
+      if (option->get_expected_max() == CLI::detail::expected_max_vector_size) text += " ...";
+    }
+    if (!option->get_envname().empty()) text += " (Env:" + option->get_envname() + ")";
+    return text;
+  }
+  std::string make_option_desc(const CLI::Option* option) const override {
+    const std::string& value = option->get_default_str();
+    return Wrapped(option->get_description() + (value.empty() ? "" : " (default: " + value + ")"),
+                   kWidth - column_width_);
+  }
+
+ private:
+  static constexpr std::size_t kWidth = 100;
 };
 
 /// The command that the words reached before something went wrong.
@@ -126,9 +168,6 @@ Names NamesOf(const std::string& type) {
   if (type == "TOPIC") return Names::kTopics;
   return Names::kNothing;
 }
-
-/// Without what follows the first sentence or line.
-std::string Brief(const std::string& help) { return help.substr(0, help.find('\n')); }
 
 /// Troff's own characters in text.
 std::string Roff(const std::string& text) {
@@ -268,7 +307,6 @@ CommandLine::CommandLine(const std::string& program, const std::string& summary,
   app_->footer(Footer(examples, notes));
   const auto formatter = std::make_shared<Formatter>();
   formatter->column_width(34);
-  formatter->label("REQUIRED", "");
   app_->formatter(formatter);
 }
 

@@ -82,8 +82,9 @@ void AddJoinCommand(Command& record) {
   const auto words = std::make_shared<Words>();
   Command command = record.Add(
       "join",
-      "Makes one recording, on the first one's clock, of several that recorders on different "
-      "machines made of one trial; needs no server",
+      "Makes one recording of several that were made of one trial; needs no server\n\n"
+      "Recorders on different machines have a clock each: what the others have is brought to the\n"
+      "first one's.",
       {"exemplar record join suit-machine.mcap robot-machine.mcap -o trial-001.mcap"});
   command.Arguments("FILE", words->files, "MCAP; several");
   command.Option("-o,--output", "FILE", words->output, "the new file").Required();

@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
        "exemplar skill query press --object button=0.45,-0.2,0.06 --format csv",
        "exemplar skill execute press --object button=0.45,-0.2,0.06 --wait"},
       "Exit codes: 0 done, 2 bad usage, 3 not found, 4 refused as invalid, unsafe or not allowed,\n"
-      "5 no service answers, 1 anything else.");
+      "5 no service answers, 130 interrupted (Ctrl-C), 1 anything else.");
   line.root()
       .Option("--server", "HOST:PORT", session.server,
               std::string("the gateway, or a service directly (default: ") +

@@ -142,7 +142,9 @@ int Execute(const Session& session, const Words& words) {
       },
       signals.token());
   display.Clear();
-  if (!result) return Fail(result.error());
+  if (!result) {
+    return FailOrInterrupted(result.error(), signals.token(), "the robot slows down and holds");
+  }
   if (words.format == "json") {
     Print(ToJson(*result));
   } else if (request->detached && result->state != "done") {
@@ -204,14 +206,16 @@ void AddMotionCommands(Command& skill, const Session& session) {
       "With --wait: streams progress until the motion has ended; Ctrl-C ends the motion. Without:\n"
       "returns once the robot moves. Exit code 4 when the motion is refused or aborted.",
       {"exemplar skill execute press --object button=0.45,-0.2,0.06 --wait",
-       "exemplar skill execute press --wait --speed 0.5"});
+       "exemplar skill execute press --wait --speed 0.5",
+       "exemplar skill execute press --follow --wait"});
   command.Argument("NAME", words->name, "of the skill").Completes(Names::kSkills);
   AddObjects(command, *words, " (default: where the objects are seen)");
   command.Option("--start", "x,y,z,qx,qy,qz,qw", words->start,
                  "go there first (default: from where the tool is)");
   command.Option("--speed", "FACTOR", words->speed, "over 0 and at most 1 (default: 1)");
   command.Flag("--wait", words->wait, "until the motion has ended");
-  command.Flag("--follow", words->follow, "the target moves: meet it where it will be");
+  command.Flag("--follow", words->follow,
+               "the target moves, as ircp/objects shows: meet it where it will be");
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([&session, words] { return Execute(session, *words); });
 }

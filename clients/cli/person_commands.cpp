@@ -134,7 +134,9 @@ int Erase(const Session& session, Words words) {
     Result<api::DataReport> report =
         service.api->Erase({.person = words.person, .dry_run = true}, {}, signals.token());
     if (!report) {
-      return Fail(WithPlace(OfService(report.error(), service.name), "nothing was erased"));
+      return FailOrInterrupted(
+          WithPlace(OfService(report.error(), service.name), "nothing was erased"), signals.token(),
+          "nothing was erased");
     }
     items += report->items.size();
     foreseen.emplace_back(service.name, *std::move(report));
@@ -147,6 +149,7 @@ int Erase(const Session& session, Words words) {
     }
     for (const auto& [service, report] : foreseen) std::cerr << ReportText(service, report);
     if (!Agreed(words.person, signals.token())) {
+      if (signals.token().stop_requested()) return Interrupted("nothing was erased");
       std::cerr << "nothing was erased\n";
       return program::ExitCode(ErrorCode::kCancelled);
     }
@@ -164,8 +167,9 @@ int Erase(const Session& session, Words words) {
     display.Clear();
     if (!report) {
       PrintReports(words, done);
-      return Fail(WithPlace(OfService(report.error(), service.name),
-                            "the erasure is not complete; run it again"));
+      return FailOrInterrupted(WithPlace(OfService(report.error(), service.name),
+                                         "the erasure is not complete; run it again"),
+                               signals.token(), "the erasure is not complete; run it again");
     }
     items += report->items.size();
     done.emplace_back(service.name, *std::move(report));

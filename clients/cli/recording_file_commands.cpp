@@ -287,8 +287,10 @@ void AddRecordingFileCommands(Command& record) {
 
   words = std::make_shared<Words>();
   command = record.Add("label",
-                       "Writes labels into a recording (success, phase, notes, ...): its messages "
-                       "stay as they are; NAME= takes a label away. Needs no server",
+                       "Writes labels into a recording, or takes them away; needs no server\n\n"
+                       "Success, phase, notes and what else is to be known of it; its messages "
+                       "stay as they are.\n"
+                       "NAME= takes a label away.",
                        {"exemplar record label trial-001.mcap success=yes phase=press",
                         "exemplar record label trial-001.mcap notes="});
   command.Argument("FILE", words->file, "MCAP");
@@ -298,8 +300,8 @@ void AddRecordingFileCommands(Command& record) {
 
   words = std::make_shared<Words>();
   command = record.Add("recover",
-                       "Makes a whole file of one whose recorder was killed; needs no server. The "
-                       "damaged file is left as it is",
+                       "Makes a whole file of one whose recorder was killed; needs no server\n\n"
+                       "The damaged file is left as it is.",
                        {"exemplar record recover trial-001.mcap",
                         "exemplar record recover cut.mcap --output whole.mcap"});
   command.Argument("FILE", words->file, "MCAP");

@@ -23,7 +23,6 @@ constexpr Duration kRedraw = std::chrono::milliseconds(100);
 constexpr Duration kLastWords = std::chrono::seconds(5);
 constexpr Duration kSeekStep = std::chrono::seconds(5);
 constexpr double kFaster = 1.25;
-constexpr int kInterrupted = 130;
 
 struct Words {
   std::string file, format, station = "default";
@@ -239,8 +238,12 @@ void AddReplayCommand(Command& record) {
   const auto words = std::make_shared<Words>();
   Command command = record.Add(
       "replay",
-      "Sends a recording's messages again, with their intervals. Commands, states, the emergency "
-      "stop and the clock are left out unless chosen. Needs no server",
+      "Sends a recording's messages again, with their intervals; needs no server\n\n"
+      "Commands, states, the emergency stop and the clock are left out unless chosen. On a "
+      "terminal:\n"
+      "space pauses, s sends one message, left and right go back and on by 5 s, up and down "
+      "change\n"
+      "the rate, q or Ctrl-C ends it.",
       {"exemplar record replay trial-001.mcap --rate 2 --station lab",
        "exemplar record replay trial-001.mcap --topic ircp/suit --start 3 --end 5 --loop"});
   command.Argument("FILE", words->file, "MCAP");
@@ -252,7 +255,7 @@ void AddReplayCommand(Command& record) {
   command.Option("--topic", "TOPIC", words->topics, "only this one; several times");
   command.Flag("--all-topics", words->all_topics, "commands, states, safety and clock as well");
   command.Option("--wait", "SECONDS", words->wait_s, "limit of the wait for readers (default: 3)");
-  command.Option("--domain", "N", words->domain, "DDS domain");
+  command.Option("--domain", "N", words->domain, "DDS domain (default: 0)");
   command.Option("--station", "NAME", words->station, "where it is played");
   AddFormat(command, words->format, {"text", "json"});
   command.Runs([words] { return Replay(*words); });

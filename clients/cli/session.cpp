@@ -72,6 +72,18 @@ int Fail(const Error& error) {
   return code;
 }
 
+int Interrupted(const std::string& standing) {
+  std::cerr << Paint("exemplar", Colour::kRed, STDERR_FILENO) << ": interrupted; " << standing
+            << '\n';
+  return kInterrupted;
+}
+
+int FailOrInterrupted(const Error& error, const std::stop_token& stop,
+                      const std::string& standing) {
+  const bool ours = stop.stop_requested() && error.code == ErrorCode::kCancelled;
+  return ours ? Interrupted(standing) : Fail(error);
+}
+
 int FailUsage(const Error& error) {
   Fail(error);
   return kUsage;

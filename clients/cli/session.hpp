@@ -4,6 +4,7 @@
 #include <iosfwd>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,7 +31,13 @@ struct Session {
 /// Says "exemplar: what is wrong" on stderr, and what helps where that is known; returns the
 /// contract's exit code.
 int Fail(const Error& error);
-/// The same for words of the command line that cannot be meant.
+/// The exit code of what a signal (Ctrl-C) ended before it was done.
+inline constexpr int kInterrupted = 130;
+/// Says that it was interrupted, and how things stand then ("nothing was changed").
+int Interrupted(const std::string& standing);
+/// Interrupted where the error comes from `stop`, else Fail.
+int FailOrInterrupted(const Error& error, const std::stop_token& stop, const std::string& standing);
+/// Fail for words of the command line that cannot be meant.
 int FailUsage(const Error& error);
 /// A line to a person at a terminal, on stderr; nothing in a pipe.
 void Hint(const std::string& text);

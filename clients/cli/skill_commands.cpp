@@ -41,7 +41,9 @@ int Learn(const Session& session, const Words& words) {
       [&](double fraction, std::string_view step) { display.Show(fraction, step); },
       signals.token());
   display.Clear();
-  if (!report) return Fail(report.error());
+  if (!report) {
+    return FailOrInterrupted(report.error(), signals.token(), "nothing was changed");
+  }
   return PrintReport(*report, words.format);
 }
 
@@ -208,11 +210,13 @@ void AddSkillCommands(Command& root, const Session& session) {
   command.Runs([&session, words] { return Versions(session, *words); });
 
   words = std::make_shared<Words>();
-  command =
-      AddOne(skill, "suggest",
-             "Says where to demonstrate next: places of the object, among the trials' and\n"
-             "between them, at which the skill's answer is least certain",
-             {"exemplar skill suggest press", "exemplar skill suggest press --count 5"}, words);
+  command = AddOne(
+      skill, "suggest",
+      "Says where to demonstrate next\n\n"
+      "Places of the object, among the trials' and between them, at which the skill's answer "
+      "is\n"
+      "least certain; metres, in the robot's base frame.",
+      {"exemplar skill suggest press", "exemplar skill suggest press --count 5"}, words);
   AddVersion(command, *words);
   command.Option("--count", "N", words->count, "how many places, 1 to 20 (default: 3)");
   AddFormat(command, words->format, {"text", "json"});

@@ -71,7 +71,10 @@ int On(const Session& session, const Words& words) {
   const Result<api::TeleoperationResult> result = clients->executor->Teleoperate(
       request, [&](const api::TeleoperationFeedback& now) { Draw(display, now); }, signals.token());
   display.Clear();
-  if (!result) return Fail(result.error());
+  if (!result) {
+    return FailOrInterrupted(result.error(), signals.token(),
+                             "teleoperation has ended, the robot holds");
+  }
   if (words.format == "json") {
     Print(ToJson(*result));
   } else if (result->state == "teleoperating") {

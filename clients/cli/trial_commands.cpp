@@ -180,11 +180,20 @@ int Delete(const Session& session, const std::vector<std::string>& ids, const st
   return code;
 }
 
-int SetPerson(const Session& session, const std::string& id, const std::string& person) {
+int SetPerson(const Session& session, const std::string& id, const std::string& person,
+              const std::string& format) {
   const Result<rpc::Clients> clients = session.Connect();
   if (!clients) return FailUsage(clients.error());
   const Status set = clients->trials->SetPerson(id, person);
-  return set ? 0 : Fail(set.error());
+  if (!set) return Fail(set.error());
+  if (format == "json") {
+    Print({{"id", id}, {"person", person}});
+  } else {
+    std::cout << id << ": "
+              << (person.empty() ? "nobody knows whose it is" : "demonstrated by " + person)
+              << '\n';
+  }
+  return 0;
 }
 
 }  // namespace
@@ -268,7 +277,9 @@ void AddTrialCommands(Command& root, const Session& session) {
        "exemplar trial set-person trial-0f3c5a7be1d20496"});
   command.Argument("ID", owned->name, "as submit printed it");
   command.OptionalArgument("PERSON", owned->person, "a pseudonymous id; none: unknown");
-  command.Runs([&session, owned] { return SetPerson(session, owned->name, owned->person); });
+  AddFormat(command, owned->format, {"text", "json"});
+  command.Runs(
+      [&session, owned] { return SetPerson(session, owned->name, owned->person, owned->format); });
 }
 
 }  // namespace exemplar::cli

@@ -25,13 +25,19 @@ struct Words {
   NetworkWords network;
 };
 
+/// For a list of topics, which cannot be cancelled.
+constexpr Duration kLongestList = std::chrono::seconds(4);
+
 /// The topics of a gateway, or read from the network by this program itself.
 class Source {
  public:
   static Result<std::unique_ptr<Source>> Open(const Session& session, const Words& words) {
     auto source = std::make_unique<Source>();
     if (!session.server.empty() && !words.network.given()) {
-      Result<rpc::Clients> clients = session.Connect();
+      Result<rpc::ClientOptions> server = session.Options();
+      if (!server) return server.error();
+      if (!session.timeout_s) server->timeout = kLongestList;
+      Result<rpc::Clients> clients = rpc::Connect(*server);
       if (!clients) return clients.error();
       source->clients_ = std::move(*clients);
       source->topics_ = source->clients_.topics.get();

@@ -13,6 +13,7 @@ import random
 import re
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import tempfile
@@ -21,7 +22,7 @@ import unittest
 import xml.etree.ElementTree
 
 BINARIES = pathlib.Path(os.environ["EXEMPLAR_BIN"])
-DONE, OTHER, USAGE, NOT_FOUND, REFUSED, UNAVAILABLE = 0, 1, 2, 3, 4, 5
+DONE, OTHER, USAGE, NOT_FOUND, REFUSED, UNAVAILABLE, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
 COMMANDS = {
     "trial": ["submit", "list", "show", "segments", "export", "delete"],
     "skill": ["learn", "list", "show", "versions", "suggest", "rollback", "delete", "query", "evaluate", "execute", "export"],
@@ -73,7 +74,7 @@ class Learning:
         self.log = open(folder / "learning.log", "ab")
         command = [BINARIES / "exemplar-learning", "--listen", "127.0.0.1:0", "--port-file", self.port_file, "--data-dir", folder / data, *words]
         self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stderr=self.log)
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + 60
         while not self.port_file.exists():
             assert self.process.poll() is None and time.monotonic() < deadline, "exemplar-learning does not listen"
             time.sleep(0.01)
@@ -92,7 +93,7 @@ class WordsTest(unittest.TestCase):
     def commands(self, *path):
         """Every command that does something, with its --help."""
         text = run(*path, "--help").stdout
-        names = re.findall(r"(?m)^  ([a-z_]+) +\S", text.partition("Subcommands:")[2].partition("Examples:")[0])
+        names = re.findall(r"(?m)^  ([a-z_-]+) +\S", text.partition("Subcommands:")[2].partition("Examples:")[0])
         for name in names:
             yield from self.commands(*path, name)
         if not names:
@@ -157,6 +158,26 @@ class WordsTest(unittest.TestCase):
             self.assertEqual((done.returncode, done.stdout), (UNAVAILABLE, ""))
             self.assertIn("no answer from 127.0.0.1:1: nobody listens there", done.stderr)
             self.assertIn("exemplar doctor --server", done.stderr)
+
+    def test_ctrl_c_is_code_130_and_says_how_things_stand(self):
+        backup = pathlib.Path(tempfile.gettempdir()) / f"exemplar-cli-{os.getpid()}.tar"
+        for words, standing in [
+            (["skill", "learn", "press"], "nothing was changed"),
+            (["skill", "execute", "press", "--wait"], "the robot slows down and holds"),
+            (["robot", "teleop", "on"], "teleoperation has ended, the robot holds"),
+            (["backup", backup], f"there is no {backup}"),
+            (["person", "erase", "user03", "--yes"], "nothing was erased"),
+        ]:
+            with self.subTest(words=words), socket.create_server(("127.0.0.1", 0)) as silent:
+                command = [BINARIES / "exemplar", "--server", f"127.0.0.1:{silent.getsockname()[1]}", *words]
+                process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                connection, _ = silent.accept()
+                process.send_signal(signal.SIGINT)
+                out, err = process.communicate(timeout=60)
+                connection.close()
+                self.assertEqual((process.returncode, out), (INTERRUPTED, ""), err)
+                self.assertTrue(err.endswith(f"exemplar: interrupted; {standing}\n"), err)
+        self.assertFalse(backup.exists())
 
     def test_a_file_that_is_not_there_is_code_3(self):
         for words in (["trial", "submit", "--skill", "a", "none.csv"], ["trial", "segments", "none.csv"], ["skill", "evaluate", "a", "none.csv"], ["record", "info", "none.mcap"]):
