@@ -133,7 +133,7 @@ class RecorderTest(unittest.TestCase):
         exemplar("record", "stop", "--server", server)
         original = self.folder / "data" / "original.mcap"
         exemplar("record", "start", "--name", "again", "--server", server)
-        played = exemplar("record", "replay", original, "--rate", "4", "--domain", "93", "--station", "test")
+        played = exemplar("record", "replay", original, "--rate", "4", "--wait", "60", "--domain", "93", "--station", "test")
         exemplar("record", "stop", "--server", server)
         self.assertEqual(played["refused"], 0)
         left_out = {topic["topic"] for topic in played["topics"] if topic["left_out"]}
@@ -151,8 +151,14 @@ class RecorderTest(unittest.TestCase):
         exemplar("record", "start", "--name", "steps", "--server", server)
         self.assertEqual(self.replay("--rate", "4").wait(60), 0, self.programs.logs())
         exemplar("record", "stop", "--server", server)
+        for end, code in ((b"q", 0), (b"\x03", 130)):  # Ctrl-C
+            with self.subTest(end=end):
+                self.assert_steps_on_a_terminal(end, code)
+
+    def assert_steps_on_a_terminal(self, end, code):
         ours, theirs = pty.openpty()
         self.addCleanup(os.close, ours)
+        before = termios.tcgetattr(ours)
         command = [processes.BINARIES / "exemplar", "record", "replay", self.folder / "data" / "steps.mcap", "--paused",
                    "--wait", "0", "--topic", TOPIC, "--domain", "93", "--station", "test"]
         player = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
@@ -173,9 +179,10 @@ class RecorderTest(unittest.TestCase):
         for number in range(1, 4):
             os.write(ours, b"s")
             shows(f" {number} sent")
-        os.write(ours, b"q")
+        os.write(ours, end)
         shows("3 messages sent")
-        self.assertEqual(player.wait(60), 0)
+        self.assertEqual(player.wait(60), code)
+        self.assertEqual(termios.tcgetattr(ours), before)
 
     def test_a_split_recording_has_every_sample_once(self):
         _, server = self.programs.recorder()
