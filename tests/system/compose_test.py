@@ -7,7 +7,6 @@ safely, and the station works again by itself within a time that is printed. Exi
 
 import contextlib
 import json
-import os
 import pathlib
 import re
 import shutil
@@ -18,18 +17,13 @@ import time
 import unittest
 
 import engine
-from engine import ROOT, Engine, Station, run
+from engine import CACHE, MEMBERS, SERVERS, Engine, Station, run, tell
 from processes import BINARIES, wait_for
 
-CACHE = pathlib.Path(os.environ.get("EXEMPLAR_DOCKER", ROOT / "build" / "docker"))
 OVERRIDE = pathlib.Path(__file__).resolve().parent / "compose_test.yaml"
 FAKETIME = pathlib.Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
 DISK = CACHE / "disk"
 DISK_MB = 160
-PLACES = ["0.46,-0.12", "0.40,-0.28", "0.52,-0.22", "0.36,-0.18"]
-NEW_PLACE = "0.45,-0.20"
-SERVERS = {"learning": "127.0.0.1:50051", "recorder": "127.0.0.1:50052", "executor": "127.0.0.1:50053"}
-LONG_RUNNING = ["recorder", "learning", "executor", "simulator", "capture-vision", "capture-tactile", "gateway"]
 LIMIT_S = 150  # for anything to work again; what it took is printed
 STARTS = 5  # of a motion that a busy machine stops
 LOSSY = {"ircp/camera"}  # best effort by design
@@ -37,19 +31,12 @@ LOSSY = {"ircp/camera"}  # best effort by design
 FETCH = "import urllib.request as u; print(u.urlopen('http://127.0.0.1:9464/metrics').read().decode())"
 
 
-def tell(text):
-    print(text, file=sys.stderr, flush=True)
-
-
 class ComposeTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="exemplar-compose-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        begin = time.monotonic()
-        with Engine(CACHE, alone=False) as builder:
-            run(ROOT / "deploy" / "docker" / "build", "--prebuilt", BINARIES.parent, env=builder.environment, timeout=1800)
-        tell(f"images: {time.monotonic() - begin:.0f} s")
+        engine.build_images()
         shutil.copy(FAKETIME, cls.folder)
         cls.clock = cls.folder / "now"
         cls.clock.write_text("+0s\n")
@@ -61,34 +48,10 @@ class ComposeTest(unittest.TestCase):
         variables = {"EXEMPLAR_TEST_DISK": str(DISK), "EXEMPLAR_TEST_FAKETIME": str(cls.folder), "EXEMPLAR_STATION": "compose"}
         cls.station = Station(cls.engine, [OVERRIDE], variables)
         try:
-            cls.station.compose("down", "--volumes", "--timeout", "5")
-            cls.teach()
+            cls.station.teach(lambda: cls.cli("learning", "skill", "learn", "press"))
         except BaseException:
-            cls.show_logs()
+            cls.station.show_logs(*MEMBERS)
             raise
-
-    @classmethod
-    def show_logs(cls):
-        for service in LONG_RUNNING:
-            with contextlib.suppress(AssertionError):
-                tell(cls.station.logs(service))
-
-    @classmethod
-    def teach(cls):
-        begin = time.monotonic()
-        cls.station.compose("up", "-d", *LONG_RUNNING, EXEMPLAR_FOLLOW="suit")
-        wait_for(lambda: cls.station.healthy(*LONG_RUNNING), "healthy containers", 90)
-        tell(f"up and healthy: {time.monotonic() - begin:.0f} s")
-        cls.station.compose("run", "--rm", "capture-suit", "--places", ";".join(PLACES), "--record", "--name", "trial", timeout=240)
-        files = [f"/trials/trial-{number:03}.mcap" for number in range(1, len(PLACES) + 1)]
-        # With the image of the command line and by the gateway, as on a machine that has nothing else.
-        submitted = json.loads(cls.station.compose("run", "--rm", "exemplar", "trial", "submit", "--skill", "press", *files, "--format", "json"))
-        assert len(submitted) == len(PLACES), submitted
-        cls.cli("learning", "skill", "learn", "press")
-        cls.station.compose("up", "-d", *LONG_RUNNING)  # the simulator now follows commands
-        wait_for(lambda: cls.station.healthy(*LONG_RUNNING), "healthy containers", 90)
-        cls.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
-        tell(f"taught by {len(PLACES)} trials: {time.monotonic() - begin:.0f} s")
 
     # ---- what the tests are made of ----
 
@@ -141,7 +104,7 @@ class ComposeTest(unittest.TestCase):
         def pressed():
             nonlocal trouble, stops
             try:
-                if not self.station.healthy(*LONG_RUNNING):
+                if not self.station.healthy(*MEMBERS):
                     return None
                 status = self.cli("executor", "robot", "status")
                 if status["state"] == "protective_stop":
@@ -181,14 +144,13 @@ class ComposeTest(unittest.TestCase):
 
     def setUp(self):
         # A test before may have left some of it down.
-        self.station.compose("up", "-d", *LONG_RUNNING)
-        wait_for(lambda: self.station.healthy(*LONG_RUNNING), "healthy containers", 90)
+        self.station.up(MEMBERS)
         self.before = self.acknowledged()
 
     def tearDown(self):
         result = self._outcome.result
         if any(getattr(case, "test_case", case) is self for case, _ in [*result.failures, *result.errors]):
-            self.show_logs()
+            self.station.show_logs(*MEMBERS)
         with contextlib.suppress(AssertionError):
             self.recorder("stop")
         self.assertEqual(self.acknowledged(), self.before)
@@ -329,14 +291,13 @@ class ComposeTest(unittest.TestCase):
         begin = time.monotonic()
         self.station.compose("stop")
         stopped = time.monotonic() - begin
-        codes = {service: self.station.inspect(service)["ExitCode"] for service in LONG_RUNNING}
+        codes = {service: self.station.inspect(service)["ExitCode"] for service in MEMBERS}
         tell(f"SIGTERM to all: {stopped:.1f} s, exit codes {codes}")
         self.assertEqual(set(codes.values()), {0}, codes)
         self.station.compose("down")
         begin = time.monotonic()
-        self.station.compose("up", "-d", *LONG_RUNNING)
-        wait_for(lambda: self.station.healthy(*LONG_RUNNING), "healthy containers", 90)
-        self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
+        self.station.up(MEMBERS)
+        self.station.place()
         self.works_again("down and up", begin)
         self.assertEqual(self.acknowledged(), self.before)
 
@@ -346,12 +307,11 @@ class ComposeTest(unittest.TestCase):
             begin = time.monotonic()
             self.station.compose("--profile", "discovery", "up", "-d", "discovery")
             wait_for(lambda: self.station.healthy("discovery"), "the discovery server", 30)
-            self.station.compose("up", "-d", *LONG_RUNNING, **server)
-            wait_for(lambda: self.station.healthy(*LONG_RUNNING), "healthy containers", 90)
+            self.station.up(MEMBERS, **server)
             # Nobody meets by multicast any more.
-            for service in LONG_RUNNING:
+            for service in MEMBERS:
                 self.station.within(service, "iptables", "-A", "OUTPUT", "-d", "224.0.0.0/4", "-j", "DROP")
-            self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only", **server)
+            self.station.place(**server)
             self.works_again("with a discovery server", begin)
             self.station.signal("discovery", "KILL")
             self.works_again("discovery server killed", time.monotonic())
@@ -360,8 +320,8 @@ class ComposeTest(unittest.TestCase):
             self.works_again("simulator killed beside the new discovery server", begin)
         finally:
             self.station.compose("--profile", "discovery", "rm", "--stop", "--force", "discovery")
-            self.station.compose("up", "-d", *LONG_RUNNING)
-            self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
+            self.station.compose("up", "-d", *MEMBERS)
+            self.station.place()
         self.works_again("with multicast again", time.monotonic())
 
     def test_prometheus_hears_every_program(self):
@@ -374,21 +334,25 @@ class ComposeTest(unittest.TestCase):
                     found = json.loads(self.station.within("prometheus", sys.executable, "-c", query))["data"]["result"]
                 except AssertionError:
                     return False
-                return {one["metric"]["program"] for one in found if one["value"][1] == "1"} == set(LONG_RUNNING)
+                return {one["metric"]["program"] for one in found if one["value"][1] == "1"} == set(MEMBERS)
 
             wait_for(up, "Prometheus to hear all", LIMIT_S)
         finally:
             self.station.compose("--profile", "observe", "rm", "--stop", "--force", "prometheus")
 
+    def test_the_gateways_image_has_the_page_where_it_was_built(self):
+        if not (engine.ROOT / "build" / "web" / "index.html").exists():
+            self.skipTest("build/web is not built (deploy/build)")
+        page = self.engine.inside(sys.executable, "-c", FETCH.replace("9464/metrics", "8080/"))
+        self.assertIn('src="/app.js"', page)
+
     def test_containers_are_nobody_and_write_nowhere_else(self):
-        for service in LONG_RUNNING:
+        for service in MEMBERS:
             made = self.station.inspect(service, all_of_it=True)
             self.assertEqual(made["Config"]["User"], "exemplar", service)
             self.assertTrue(made["HostConfig"]["ReadonlyRootfs"], service)
             self.assertEqual(made["HostConfig"]["CapDrop"], ["ALL"], service)
             self.assertIn("org.opencontainers.image.version", made["Config"]["Labels"])
-
-
 
 
 def wait_for_value(ask, what, limit_s):

@@ -4,15 +4,24 @@ So nothing that its containers send leaves them, and whatever happens, nothing o
 the machine's network, for Debian's packages.
 """
 
+import contextlib
 import json
 import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import time
 
-from processes import ROOT
+from processes import BINARIES, ROOT, wait_for
 
+# Images and the bare Debian below them, kept between tests.
+CACHE = pathlib.Path(os.environ.get("EXEMPLAR_DOCKER", ROOT / "build" / "docker"))
+SERVERS = {"learning": "127.0.0.1:50051", "recorder": "127.0.0.1:50052", "executor": "127.0.0.1:50053"}
+MEMBERS = ["recorder", "learning", "executor", "simulator", "capture-vision", "capture-tactile", "gateway"]
+# Where the person shows the robot a button, and where it is afterwards.
+PLACES = ["0.46,-0.12", "0.40,-0.28", "0.52,-0.22", "0.36,-0.18"]
+NEW_PLACE = "0.45,-0.20"
 COMPOSE = ROOT / "deploy" / "compose.yaml"
 NEEDED = ("dockerd", "containerd", "docker-compose", "debootstrap", "tini", "nsenter", "unshare", "iptables")
 
@@ -28,6 +37,18 @@ def check():
         raise Unavailable(f"not installed: {', '.join(missing)} (Debian: docker.io docker-compose debootstrap tini iptables)")
     if os.geteuid() != 0:
         raise Unavailable("needs root")
+
+
+def tell(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def build_images():
+    """The images of this build's programs, into CACHE."""
+    begin = time.monotonic()
+    with Engine(CACHE, alone=False) as builder:
+        run(ROOT / "deploy" / "docker" / "build", "--prebuilt", BINARIES.parent, env=builder.environment, timeout=1800)
+    tell(f"images: {time.monotonic() - begin:.0f} s")
 
 
 class Engine:
@@ -101,13 +122,13 @@ class Engine:
 class Station:
     """The containers of deploy/compose.yaml, under an engine."""
 
-    def __init__(self, engine, overrides, environment):
-        self.engine = engine
+    def __init__(self, engine, overrides, environment, profiles=("demo",)):
+        self.engine, self.profiles = engine, [word for name in profiles for word in ("--profile", name)]
         self.files = [word for file in (COMPOSE, *overrides) for word in ("-f", file)]
         self.environment = {**engine.environment, "COMPOSE_PROJECT_NAME": "exemplar", **environment}
 
     def compose(self, *words, timeout=180, **environment):
-        command = ["docker-compose", *self.files, "--profile", "demo", *words]
+        command = ["docker-compose", *self.files, *self.profiles, *words]
         return run(*command, env={**self.environment, **environment}, timeout=timeout)
 
     def inspect(self, service, all_of_it=False):
@@ -120,6 +141,35 @@ class Station:
             return state["Running"] and not state["Paused"] and state.get("Health", {}).get("Status") == "healthy"
 
         return all(well(self.inspect(service)) for service in services)
+
+    def up(self, services, **environment):
+        self.compose("up", "-d", *services, **environment)
+        wait_for(lambda: self.healthy(*services), "healthy containers", 90)
+
+    def place(self, where=NEW_PLACE, **environment):
+        """Moves the button."""
+        self.compose("run", "--rm", "capture-suit", "--places", where, "--place-only", **environment)
+
+    def teach(self, learn):
+        """Brings it up, has a person teach it and submits the recordings; then `learn()`; then the robot follows commands."""
+        begin = time.monotonic()
+        self.compose("down", "--volumes", "--timeout", "5")
+        self.up(MEMBERS, EXEMPLAR_FOLLOW="suit")
+        tell(f"up and healthy: {time.monotonic() - begin:.0f} s")
+        self.compose("run", "--rm", "capture-suit", "--places", ";".join(PLACES), "--record", "--name", "trial", timeout=240)
+        files = [f"/trials/trial-{number:03}.mcap" for number in range(1, len(PLACES) + 1)]
+        # With the image of the command line and by the gateway, as on a machine that has nothing else.
+        submitted = json.loads(self.compose("run", "--rm", "exemplar", "trial", "submit", "--skill", "press", *files, "--format", "json"))
+        assert len(submitted) == len(PLACES), submitted
+        learn()
+        self.up(MEMBERS)
+        self.place()
+        tell(f"taught by {len(PLACES)} trials: {time.monotonic() - begin:.0f} s")
+
+    def show_logs(self, *services):
+        for service in services:
+            with contextlib.suppress(AssertionError):
+                tell(self.logs(service))
 
     def signal(self, service, name):
         """Straight to the program, past the engine: to it the container just died."""

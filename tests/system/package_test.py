@@ -5,7 +5,6 @@ packages, and run in one that has no network but loopback. Exit code 77: no engi
 """
 
 import json
-import os
 import pathlib
 import re
 import shutil
@@ -18,10 +17,9 @@ import unittest
 
 import engine
 import trials
-from engine import ROOT, Engine, run
+from engine import CACHE, ROOT, Engine, run
 from processes import BINARIES, wait_for
 
-CACHE = pathlib.Path(os.environ.get("EXEMPLAR_DOCKER", ROOT / "build" / "docker"))
 UNITS = ["recorder", "learning", "executor", "capture-tactile", "capture-vision", "simulator", "gateway"]
 IMAGE = "exemplar/installed-packages:test"
 NAME = "exemplar-packages"

@@ -16,16 +16,11 @@ import time
 import unittest
 
 import engine
-from engine import ROOT, Engine, Station, run
+from engine import CACHE, MEMBERS, ROOT, SERVERS, Engine, Station, run, tell
 from processes import BINARIES, wait_for
 
-CACHE = pathlib.Path(os.environ.get("EXEMPLAR_DOCKER", ROOT / "build" / "docker"))
 OVERRIDES = [ROOT / "deploy" / "compose.secured.yaml", pathlib.Path(__file__).resolve().parent / "secured_compose_test.yaml"]
 NAME = "secured"
-PLACES = ["0.46,-0.12", "0.40,-0.28", "0.52,-0.22", "0.36,-0.18"]
-NEW_PLACE = "0.45,-0.20"
-SERVERS = {"learning": "127.0.0.1:50051", "recorder": "127.0.0.1:50052", "executor": "127.0.0.1:50053"}
-MEMBERS = ["recorder", "learning", "executor", "simulator", "capture-vision", "capture-tactile", "gateway"]
 FAR_MEMBERS = [name for name in MEMBERS if name != "simulator"] + ["far-robot"]
 FAR = {"EXEMPLAR_DDS": "--peer 10.95.3.14"}
 STATE_RATE_HZ = 125
@@ -41,10 +36,6 @@ except urllib.error.HTTPError as error:
 """
 
 
-def tell(text):
-    print(text, file=sys.stderr, flush=True)
-
-
 class SecuredComposeTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -56,48 +47,26 @@ class SecuredComposeTest(unittest.TestCase):
         cls.security("issue", cls.files, "anna", "--role", "person", "--call", "administer")
         cls.watcher = cls.security("token", cls.files, "watcher", "--role", "observe").strip()
         cls.operator = (cls.files / "tokens" / "operator").read_text(encoding="ascii").strip()
-        with Engine(CACHE, alone=False) as builder:
-            run(ROOT / "deploy" / "docker" / "build", "--prebuilt", BINARIES.parent, env=builder.environment, timeout=1800)
+        engine.build_images()
         stack = contextlib.ExitStack()
         cls.addClassCleanup(stack.close)
         cls.engine = stack.enter_context(Engine(CACHE, alone=True))
         cls.engine.inside("sysctl", "-qw", "net.ipv4.ip_forward=1")
-        cls.station = Station(cls.engine, OVERRIDES, {"EXEMPLAR_STATION": NAME, "EXEMPLAR_STATION_FILES": str(cls.files)})
+        variables = {"EXEMPLAR_STATION": NAME, "EXEMPLAR_STATION_FILES": str(cls.files)}
+        cls.station = Station(cls.engine, OVERRIDES, variables, profiles=("demo", "far"))
         try:
-            cls.station.compose("down", "--volumes", "--timeout", "5")
-            cls.teach()
+            cls.station.teach(lambda: cls.cli("learning", "skill", "learn", "press"))
         except BaseException:
             cls.show_logs()
             raise
 
     @classmethod
     def show_logs(cls):
-        for service in [*MEMBERS, "far-robot"]:
-            with contextlib.suppress(AssertionError):
-                tell(cls.station.logs(service))
+        cls.station.show_logs(*MEMBERS, "far-robot")
 
     @classmethod
     def security(cls, *words):
         return run(BINARIES / "exemplar", "security", *words)
-
-    @classmethod
-    def up(cls, services, **environment):
-        cls.station.compose("--profile", "far", "up", "-d", *services, **environment)
-        wait_for(lambda: cls.station.healthy(*services), "healthy containers", 90)
-
-    @classmethod
-    def teach(cls):
-        begin = time.monotonic()
-        cls.up(MEMBERS, EXEMPLAR_FOLLOW="suit")
-        cls.station.compose("run", "--rm", "capture-suit", "--places", ";".join(PLACES), "--record", "--name", "trial", timeout=240)
-        files = [f"/trials/trial-{number:03}.mcap" for number in range(1, len(PLACES) + 1)]
-        # By the gateway, with the operator's token.
-        submitted = json.loads(cls.station.compose("run", "--rm", "exemplar", "trial", "submit", "--skill", "press", *files, "--format", "json"))
-        assert len(submitted) == len(PLACES), submitted
-        cls.cli("learning", "skill", "learn", "press")
-        cls.up(MEMBERS)  # the simulator now follows commands
-        cls.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only")
-        tell(f"secured: taught by {len(PLACES)} trials after {time.monotonic() - begin:.0f} s")
 
     @classmethod
     def cli(cls, service, *words):
@@ -145,8 +114,8 @@ class SecuredComposeTest(unittest.TestCase):
             self.show_logs()
 
     def setUp(self):
-        self.station.compose("--profile", "far", "rm", "--stop", "--force", "far-robot")
-        self.up(MEMBERS)
+        self.station.compose("rm", "--stop", "--force", "far-robot")
+        self.station.up(MEMBERS)
 
     def test_members_meet_by_multicast_on_one_bridge_and_the_robot_presses(self):
         self.pressed("secured, by multicast", MEMBERS, time.monotonic())
@@ -154,9 +123,21 @@ class SecuredComposeTest(unittest.TestCase):
     def test_members_meet_by_static_peers_across_two_bridges(self):
         begin = time.monotonic()
         self.station.compose("stop", "simulator")
-        self.up(FAR_MEMBERS, **FAR)
-        self.station.compose("run", "--rm", "capture-suit", "--places", NEW_PLACE, "--place-only", **FAR)
+        self.station.up(FAR_MEMBERS, **FAR)
+        self.station.place(**FAR)
         self.pressed("secured, by static peers across two bridges", FAR_MEMBERS, begin)
+
+    def test_the_laboratorys_profile_is_secured_likewise(self):
+        laboratory = [f"lab-{name}" for name in MEMBERS if name != "simulator"]
+        self.station.compose("stop")
+        try:
+            self.station.up(laboratory)
+            wait_for(lambda: self.topics().get("ircp/executor/status", {}).get("received"), "the recorder to hear the executor", 60)
+            ca = self.files / "members" / "gateway" / "ca.pem"
+            page = self.engine.inside(sys.executable, "-c", STATUS, ca, "https://localhost:8080/exemplar.v1.SkillService/List", self.operator)
+            self.assertEqual(page.strip(), "200")
+        finally:
+            self.station.compose("rm", "--stop", "--force", *laboratory)
 
     def test_strangers_read_nothing_and_write_nothing(self):
         self.station.compose("--profile", "strangers", "up", "-d", "stranger-reader", "stranger-writer")
@@ -222,7 +203,7 @@ class SecuredComposeTest(unittest.TestCase):
         self.security("issue", self.files, "capture-tactile", "--role", "capture")
         run("chown", "-R", "10001:10001", self.files / "members" / "capture-tactile")
         self.station.compose("rm", "--stop", "--force", "capture-tactile")
-        self.up(MEMBERS)
+        self.station.up(MEMBERS)
         wait_for(lambda: self.topics().get("ircp/tactile", {}).get("received"), "touch to be recorded again", 60)
 
 
