@@ -103,6 +103,23 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
   Result<std::vector<geometry::NamedPose>> objects = ObjectsFor(request);
   if (!objects.ok()) return objects.error();
 
+  // What is seen stands where it is seen, but what was asked for stands where it was asked for.
+  std::vector<geometry::NamedPose> seen;
+  for (const api::SeenObject& object : view_.objects(clock_.Steady())) seen.push_back(object.pose);
+  std::vector<geometry::NamedPose> placed = seen;
+  placed.insert(placed.end(), objects->begin(), objects->end());
+  Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
+      robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
+  if (!checker.ok()) return checker.error();
+  motion::PlanOptions options = options_.plan;
+  options.speed_scale = request.speed;
+  const Result<motion::Departure> departure =
+      motion::PlanDeparture(robot_.model, robot_.chain, *checker, start, options);
+  if (!departure.ok()) return departure.error();
+  if (const auto frames = departure->trajectory.positions.rows(); frames > 0) {
+    start = departure->trajectory.positions.row(frames - 1).transpose();
+  }
+
   demonstration::SkillQuery query;
   query.objects = *objects;
   if (request.start) {
@@ -115,17 +132,20 @@ Result<Planned> Planner::Plan(const api::ExecuteRequest& request,
   Result<demonstration::SkillMotion> motion = skills_.Query(request.skill, request.version, query);
   if (!motion.ok()) return motion.error();
 
-  // What is seen stands where it is seen, but what was asked for stands where it was asked for.
-  std::vector<geometry::NamedPose> placed;
-  for (const api::SeenObject& seen : view_.objects(clock_.Steady())) placed.push_back(seen.pose);
   const std::vector<geometry::NamedPose>& used =
       motion->objects.empty() ? *objects : motion->objects;
-  placed.insert(placed.end(), used.begin(), used.end());
-  Result<collision::CollisionChecker> checker = collision::CollisionChecker::Create(
-      robot_.model, collision::MakeScene(scene_, placed), collision::OptionsOf(robot_));
-  if (!checker.ok()) return checker.error();
-  Result<Planned> planned =
-      PlanGuarded(*motion, *std::move(checker), *measured, start, request.speed, chase, stop);
+  const bool turned_by_skill =
+      !motion->objects.empty() &&
+      std::any_of(objects->begin(), objects->end(),
+                  [](const geometry::NamedPose& object) { return !object.has_orientation; });
+  if (turned_by_skill) {
+    placed = seen;
+    placed.insert(placed.end(), used.begin(), used.end());
+    const Status set = checker->SetScene(collision::MakeScene(scene_, placed));
+    if (!set.ok()) return set.error();
+  }
+  Result<Planned> planned = PlanGuarded(*motion, *std::move(checker), *measured, start, *departure,
+                                        request.speed, chase, stop);
   if (!planned.ok()) return planned;
   planned->objects = used;
   planned->placed = std::move(placed);
@@ -164,8 +184,8 @@ Status Planner::TakeCarries(const demonstration::SkillMotion& motion, const Chas
 Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
                                      collision::CollisionChecker checker,
                                      const MeasuredState& measured, const Eigen::VectorXd& start,
-                                     double speed, const Chase* chase,
-                                     const std::stop_token& stop) const {
+                                     const motion::Departure& departure, double speed,
+                                     const Chase* chase, const std::stop_token& stop) const {
   motion::PlanOptions options = options_.plan;
   options.speed_scale = speed;
   const auto [closed, open] = std::minmax_element(motion.hand_open.begin(), motion.hand_open.end());
@@ -179,15 +199,24 @@ Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
   // What a hand goes to is taken, not pressed.
   const bool may_guard = !grasps && options_.guard.touch_n > 0 && measured.feels_touch &&
                          (chase == nullptr || chase->guarded.value_or(true));
+  const auto plan = [&](const demonstration::SkillMotion& asked) {
+    Result<motion::PlannedMotion> made =
+        motion::PlanMotion(asked, robot_.model, robot_.chain, checker, start, options, stop);
+    if (made.ok()) motion::Prepend(departure, *made);
+    return made;
+  };
   std::vector<std::string> warnings = motion.warnings;
+  for (const motion::TouchWindow& touch : departure.touches) {
+    warnings.push_back("the robot stands in touch with \"" + touch.object +
+                       "\": it backs off from there first");
+  }
   std::vector<GuardZone> zones;
   Result<motion::PlannedMotion> planned = FailedPrecondition("not planned");
   std::optional<demonstration::SkillMotion> guarded;
   if (may_guard) guarded = Guarded(motion, chase);
   if (guarded) {
     if (chase != nullptr) chase->adjust(*guarded, true);
-    planned =
-        motion::PlanMotion(*guarded, robot_.model, robot_.chain, checker, start, options, stop);
+    planned = plan(*guarded);
     if (planned.ok() && chase == nullptr) {
       zones = GuardZones(*planned, motion, robot_.chain, scene_, options_.guard);
     } else if (!planned.ok()) {
@@ -199,8 +228,7 @@ Result<Planned> Planner::PlanGuarded(const demonstration::SkillMotion& motion,
     if (chase != nullptr && chase->guarded.value_or(false)) return planned.error();
     demonstration::SkillMotion by_position = motion;
     if (chase != nullptr) chase->adjust(by_position, false);
-    planned =
-        motion::PlanMotion(by_position, robot_.model, robot_.chain, checker, start, options, stop);
+    planned = plan(by_position);
   }
   if (!planned.ok()) return planned.error();
   const std::vector<std::string>& more = planned->report.warnings;

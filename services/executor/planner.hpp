@@ -14,6 +14,7 @@
 #include "exemplar/base/clock.hpp"
 #include "exemplar/collision/scene.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/motion/departure.hpp"
 #include "exemplar/motion/plan.hpp"
 #include "exemplar/scene/description.hpp"
 
@@ -66,7 +67,8 @@ class Planner {
   Planner(const Clock& clock, api::SkillApi& skills, const kinematics::RobotDescription& robot,
           const scene::Description& scene, const RobotView& view, PlannerOptions options);
 
-  /// `last_command`: where the robot was told to be, where it was told anything.
+  /// `last_command`: where the robot was told to be, where it was told anything. Where it stands in
+  /// a touch it backs off first, and the skill is asked for the motion from there.
   Result<Planned> Plan(const api::ExecuteRequest& request,
                        const std::optional<Eigen::VectorXd>& last_command, std::stop_token stop,
                        const Chase* chase = nullptr) const;
@@ -91,8 +93,8 @@ class Planner {
   /// Guarded where there is a press, a touch sensor and room for it.
   Result<Planned> PlanGuarded(const demonstration::SkillMotion& motion,
                               collision::CollisionChecker checker, const MeasuredState& measured,
-                              const Eigen::VectorXd& start, double speed, const Chase* chase,
-                              const std::stop_token& stop) const;
+                              const Eigen::VectorXd& start, const motion::Departure& departure,
+                              double speed, const Chase* chase, const std::stop_token& stop) const;
   /// What the motion carries, whose bodies the checker gets to know.
   Status TakeCarries(const demonstration::SkillMotion& motion, const Chase* chase,
                      collision::CollisionChecker& checker,

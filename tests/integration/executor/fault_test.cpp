@@ -144,6 +144,31 @@ TEST_F(FaultTest, PlansOnceTheRobotRestsAfterACancel) {
   EXPECT_TRUE(planned.ok()) << planned.error().message;
 }
 
+TEST_F(FaultTest, BacksOffFromWhatItPressesWhereItWasStopped) {
+  const auto height_m = [this] { return robot_.chain.ToolPose(measured_).translation.z(); };
+  for (const bool stop : {true, false}) {
+    SCOPED_TRACE(stop ? "stop" : "cancel");
+    Begin(Press());
+    for (int i = 0; i < 2000 && height_m() > kTarget.z() - 1e-3; ++i) Step();
+    ASSERT_TRUE((stop ? executor_->Stop() : executor_->Cancel()).ok());
+    EXPECT_EQ(Finish()->state, stop ? "protective_stop" : "aborted");
+    ASSERT_LT(height_m(), kTarget.z());
+    EXPECT_TRUE(executor_->Reset().ok());
+    const double pressed_m = height_m();
+    Begin(Press());
+    for (int i = 0; i < 100; ++i) {
+      Step();
+      EXPECT_GT(height_m(), pressed_m - 3e-4);
+    }
+    EXPECT_GT(skills_.last_query->start->translation.z(), kTarget.z() + 0.02);
+    const Result<api::ExecutionResult> result = Finish();
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_EQ(result->state, "done") << result->detail;
+    ASSERT_FALSE(result->plan.warnings.empty());
+    EXPECT_NE(result->plan.warnings[0].find("it backs off from there first"), std::string::npos);
+  }
+}
+
 class ImpatientTest : public FaultTest {
  protected:
   static ExecutorOptions Impatient() {

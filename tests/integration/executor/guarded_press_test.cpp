@@ -23,6 +23,7 @@ struct Outcome {
   std::optional<std::string> wrong;
   double end_height_m = 0;  ///< of the tool over where the target is expected
   double largest_step_rad = 0;
+  Eigen::VectorXd commanded = {};
 };
 
 class GuardedPress : public ::testing::Test {
@@ -38,8 +39,8 @@ class GuardedPress : public ::testing::Test {
     scene_.buttons.push_back(button);
   }
 
-  /// The target is expected at kTarget, and stands `lower_m` lower than that.
-  Outcome Press(double lower_m, double guard_touch_n) {
+  /// Of the target at kTarget, from where the robot was told to be.
+  Result<Planned> Plan(const Eigen::VectorXd& start, double guard_touch_n) {
     ManualClock clock;
     test::PressSkill skills;
     RobotView view(robot_.chain.joint_names());
@@ -49,14 +50,45 @@ class GuardedPress : public ::testing::Test {
     options.guard.touch_n = guard_touch_n;
     ircp::JointStateSample state;
     state.names = robot_.chain.joint_names();
-    state.positions.assign(robot_.home.data(), robot_.home.data() + robot_.home.size());
+    state.positions.assign(start.data(), start.data() + start.size());
     state.touch_n = {0};
     view.Take(state, clock.Steady());
     const Planner planner(clock, skills, robot_, scene_, view, options);
     api::ExecuteRequest request;
     request.skill = "press";
     request.objects = {{"target", geometry::Pose::FromTranslation(kTarget), true}};
-    Result<Planned> planned = planner.Plan(request, std::nullopt, {});
+    return planner.Plan(request, std::nullopt, {});
+  }
+
+  /// One period of the control loop, of the physics and of the watch.
+  void Cycle(MotionRun& run, simulator::World& world, State state, Outcome& outcome) const {
+    const Setpoint& setpoint = run.Tick(kPeriod_s, state, 1);
+    const auto n = robot_.chain.dof();
+    const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(setpoint.positions.data(), n);
+    world.SetTarget(q, Eigen::Map<const Eigen::VectorXd>(setpoint.velocities.data(), n));
+    if (outcome.commanded.size() > 0) {
+      outcome.largest_step_rad =
+          std::max(outcome.largest_step_rad, (q - outcome.commanded).cwiseAbs().maxCoeff());
+    }
+    outcome.commanded = q;
+    for (int step = 0; step < 8; ++step) {
+      world.Step();
+      outcome.touch_max_n = std::max(outcome.touch_max_n, world.touch_n());
+    }
+    MeasuredState measured;
+    measured.joints = world.positions();
+    measured.touch_n = world.touch_n();
+    measured.received = world.time();
+    measured.stamp = Stamp::FromNanoseconds(world.time().count());
+    measured.feels_touch = true;
+    run.Measure(measured);
+    const std::optional<std::string> wrong = run.Watch();
+    if (wrong && !outcome.wrong) outcome.wrong = wrong;
+  }
+
+  /// The target is expected at kTarget, and stands `lower_m` lower than that.
+  Outcome Press(double lower_m, double guard_touch_n) {
+    Result<Planned> planned = Plan(robot_.home, guard_touch_n);
     EXPECT_TRUE(planned.ok()) << planned.error().message;
     if (!planned.ok()) return {};
     EXPECT_EQ(planned->zones.size(), guard_touch_n > 0 ? 1U : 0U);
@@ -70,28 +102,8 @@ class GuardedPress : public ::testing::Test {
     MotionRun run(robot_, std::move(planned->motion), std::move(planned->checker), limits,
                   std::move(planned->zones));
     Outcome outcome;
-    Eigen::VectorXd before = robot_.home;
     for (int cycle = 0; cycle < 4000 && !run.finished(); ++cycle) {
-      const Setpoint& setpoint = run.Tick(kPeriod_s, State::kExecuting, 1);
-      const auto n = robot_.chain.dof();
-      const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(setpoint.positions.data(), n);
-      world->SetTarget(q, Eigen::Map<const Eigen::VectorXd>(setpoint.velocities.data(), n));
-      outcome.largest_step_rad =
-          std::max(outcome.largest_step_rad, (q - before).cwiseAbs().maxCoeff());
-      before = q;
-      for (int step = 0; step < 8; ++step) {
-        world->Step();
-        outcome.touch_max_n = std::max(outcome.touch_max_n, world->touch_n());
-      }
-      MeasuredState measured;
-      measured.joints = world->positions();
-      measured.touch_n = world->touch_n();
-      measured.received = world->time();
-      measured.stamp = Stamp::FromNanoseconds(world->time().count());
-      measured.feels_touch = true;
-      run.Measure(measured);
-      const std::optional<std::string> wrong = run.Watch();
-      if (wrong && !outcome.wrong) outcome.wrong = wrong;
+      Cycle(run, *world, State::kExecuting, outcome);
     }
     outcome.finished = run.finished();
     outcome.clicks = world->buttons()[0].clicks;
@@ -134,6 +146,48 @@ TEST_F(GuardedPress, SaysWhatWasNotMetWithinTheGuard) {
   EXPECT_EQ(outcome.clicks, 0U);
   EXPECT_EQ(outcome.touch_max_n, 0);
   EXPECT_GT(outcome.end_height_m, 0.06);
+}
+
+TEST_F(GuardedPress, BacksOffAndPressesAgainAfterAStopInTheTouch) {
+  for (const double guard_touch_n : {0.0, kTouch_n}) {
+    SCOPED_TRACE(guard_touch_n);
+    Result<simulator::World> world = simulator::World::Create(robot_, scene_);
+    ASSERT_TRUE(world.ok());
+    Result<Planned> first = Plan(robot_.home, guard_touch_n);
+    ASSERT_TRUE(first.ok()) << first.error().message;
+    Outcome stopped;
+    MotionRun run(robot_, std::move(first->motion), std::move(first->checker), {},
+                  std::move(first->zones));
+    for (int cycle = 0; cycle < 4000 && !run.finished(); ++cycle) {
+      const bool stop = stopped.touch_max_n > 2;
+      Cycle(run, *world, stop ? State::kProtectiveStop : State::kExecuting, stopped);
+    }
+    ASSERT_FALSE(stopped.wrong) << *stopped.wrong;
+    ASSERT_GT(world->touch_n(), 1) << "it still presses";
+    const double touch_n = world->touch_n();
+    const std::uint64_t clicks = world->buttons()[0].clicks;
+
+    Result<Planned> second = Plan(stopped.commanded, guard_touch_n);
+    ASSERT_TRUE(second.ok()) << second.error().message;
+    ASSERT_FALSE(second->warnings.empty());
+    EXPECT_NE(second->warnings[0].find("in touch with \"target\""), std::string::npos)
+        << second->warnings[0];
+    const double away_s = second->motion.touches.at(0).end_s;
+    Outcome again;
+    MotionRun next(robot_, std::move(second->motion), std::move(second->checker), {},
+                   std::move(second->zones));
+    for (int cycle = 0; cycle < 4000 && !next.finished(); ++cycle) {
+      Cycle(next, *world, State::kExecuting, again);
+      if (next.path_time_s() < away_s) {
+        EXPECT_LT(again.touch_max_n, touch_n + 0.5);
+      }
+    }
+    EXPECT_TRUE(next.finished());
+    EXPECT_FALSE(again.wrong) << *again.wrong;
+    EXPECT_EQ(next.missed(), nullptr);
+    EXPECT_EQ(world->buttons()[0].clicks, clicks + 1);
+    EXPECT_EQ(world->touch_n(), 0);
+  }
 }
 
 }  // namespace

@@ -283,6 +283,32 @@ TEST(FirstViolation, LeavesPermittedTouchesOut) {
   EXPECT_FALSE(checker.FirstViolation(sweep, 0, 0.3, 0).has_value());
 }
 
+TEST(FirstViolation, TellsHowDeepWhatOverlapsMayGo) {
+  const RobotModel model = TwoLinks();
+  // The ball of the hand goes through it, 60 mm deep in the middle.
+  const CollisionChecker checker = *CollisionChecker::Create(
+      model, {{{"ball", Pose::FromTranslation({1.04 * std::cos(0.8), 1.04 * std::sin(0.8), 0}),
+                Sphere{0.05}}}});
+  const Line sweep(State(model, 0.76, 0), State(model, 0.84, 0));
+  const std::vector<AllowedTouch> lower = {{"lower", "ball"}};
+  Eigen::VectorXd q(static_cast<Eigen::Index>(model.joints.size()));
+  double deepest = 0;
+  for (int k = 0; k <= 100; ++k) {
+    sweep.Position(k / 100.0, q);
+    deepest = std::min(deepest, checker.SmallestClearance(q, lower).distance_m);
+  }
+  ASSERT_NEAR(deepest, -0.06, 1e-3);
+  sweep.Position(0, q);
+  const double at_begin = checker.SmallestClearance(q, lower).distance_m;
+  ASSERT_GT(at_begin, deepest + 3e-3);
+  // Neither end is as deep as the middle, and boxes around both bodies overlap all along.
+  const std::optional<Violation> found =
+      checker.FirstViolation(sweep, 0, 1, 0.5 * (at_begin + deepest), lower);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT(found->clearance.distance_m, 0.5 * (at_begin + deepest) + 1e-4);
+  EXPECT_FALSE(checker.FirstViolation(sweep, 0, 1, deepest - 1e-3, lower).has_value());
+}
+
 // ---------------------------------------------------------------- scenes
 
 TEST(MakeScene, PutsAButtonsBodyBelowItsContact) {

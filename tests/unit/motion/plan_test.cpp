@@ -299,8 +299,8 @@ TEST_F(PlanOnArm7, RefusesWhenTheStartItselfIsInAnObstacle) {
   EXPECT_NE(plan.error().message.find("at 0.00 s"), std::string::npos) << plan.error().message;
 }
 
-TEST_F(PlanOnArm7, RisesFromTheLastPressBeforeItGoesElsewhere) {
-  // A first motion that ends in the press.
+TEST_F(PlanOnArm7, RefusesToBeginInATouch) {
+  // A first motion that ends in the press; PlanDeparture leads out of it.
   SkillMotion press = MakePress(HomePose(), kTarget);
   const auto end = static_cast<std::size_t>(press.contacts[0].last);
   press.time_s.resize(end);
@@ -309,17 +309,26 @@ TEST_F(PlanOnArm7, RisesFromTheLastPressBeforeItGoesElsewhere) {
   const Result<PlannedMotion> first = Plan(press);
   ASSERT_TRUE(first.ok()) << first.error().message;
   const Eigen::VectorXd pressed = first->trajectory.positions.bottomRows(1).transpose();
+  EXPECT_FALSE(Plan(MakePress(HomePose(), kTarget), pressed).ok());
+}
 
-  const Result<PlannedMotion> second = Plan(MakePress(HomePose(), kTarget), pressed);
-  ASSERT_TRUE(second.ok()) << second.error().message;
-  ASSERT_EQ(second->touches.size(), 2U);
-  EXPECT_EQ(second->touches[0].begin_s, 0);
-  EXPECT_LT(second->touches[0].end_s, second->report.approach_s);
-  EXPECT_GE(second->report.smallest_clearance.distance_m, options_.required_clearance_m);
-  // Without a contact in the new motion nothing may be touched, not even on the way out.
-  SkillMotion elsewhere = MakePress(HomePose(), kTarget + Eigen::Vector3d(0, 0, 0.1));
-  elsewhere.contacts.clear();
-  EXPECT_FALSE(Plan(elsewhere, pressed).ok());
+TEST_F(PlanOnArm7, CountsTheMarginOfATouchFromTheContactsPlaceHoweverDeepItGoes) {
+  const Result<PlannedMotion> plain = Plan(MakePress(HomePose(), kTarget));
+  ASSERT_TRUE(plain.ok()) << plain.error().message;
+  // A short contact far below the place where it is expected, as of a guarded press.
+  SkillMotion deep = MakePress(HomePose(), kTarget, {.depth_m = 0.014});
+  demonstration::Contact& contact = deep.contacts[0];
+  const int middle = (contact.first + contact.last) / 2;
+  contact.first = middle - 2;
+  contact.last = middle + 2;
+  const Result<PlannedMotion> plan = Plan(deep);
+  ASSERT_TRUE(plan.ok()) << plan.error().message;
+  EXPECT_NEAR(plan->report.smallest_clearance.distance_m,
+              plain->report.smallest_clearance.distance_m, 2e-3);
+  for (const double t : {plan->touches[0].begin_s, plan->touches[0].end_s}) {
+    const geometry::Pose tool = robot_.chain.ToolPose(At(plan->trajectory, t));
+    EXPECT_NEAR((tool.translation - kTarget).norm(), options_.touch_margin_m, 4e-3) << t;
+  }
 }
 
 TEST_F(PlanOnArm7, FollowsAPathWithoutOrientationByPosition) {

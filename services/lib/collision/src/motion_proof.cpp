@@ -91,8 +91,8 @@ class Proof {
         motion += lever.length * impl_.proof_travel[lever.joint];
       }
       const double needed = 2 * required_m_ + motion;
-      if (impl_.LowerBound(pair, low) + impl_.LowerBound(pair, high) >= needed) continue;
-      if (impl_.TightBound(pair, low) + impl_.TightBound(pair, high) >= needed) continue;
+      if (Suffice(impl_.LowerBound(pair, low), impl_.LowerBound(pair, high), needed)) continue;
+      if (Suffice(impl_.TightBound(pair, low), impl_.TightBound(pair, high), needed)) continue;
       const double at_low = Measured(index, low, needed);
       if (at_low < required_m_) return Place{&low, index};
       const double at_high = Measured(index, high, needed);
@@ -115,6 +115,11 @@ class Proof {
       return found;
     }
     return Search(level.middle, high, unproved, depth + 1);
+  }
+
+  /// Bounds of what overlaps are 0, however deep it overlaps: where that may be, they say nothing.
+  bool Suffice(double at_low, double at_high, double needed) const {
+    return at_low + at_high >= needed && (required_m_ >= 0 || std::min(at_low, at_high) > 0);
   }
 
   /// A lower bound of the distance of a pair, exact unless it is `enough_m` or more.

@@ -38,33 +38,30 @@ std::optional<Eigen::VectorXd> Raised(const kinematics::Chain& chain,
 
 }  // namespace
 
-Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinematics::Chain& chain,
-                              const collision::CollisionChecker& checker,
-                              const Eigen::Ref<const Eigen::VectorXd>& start,
-                              const Eigen::Ref<const Eigen::VectorXd>& goal,
-                              std::vector<collision::AllowedTouch> touches,
-                              const std::vector<collision::AllowedTouch>& ignored,
-                              const PlanOptions& options) {
-  touches.insert(touches.end(), ignored.begin(), ignored.end());
-  if ((start - goal).cwiseAbs().maxCoeff() < kThere_rad) return Approach{};
-  const auto time = [&](const Way& way, std::size_t first, std::size_t last) {
+Result<JointTrajectory> PlanApproach(const kinematics::RobotModel& model,
+                                     const kinematics::Chain& chain,
+                                     const collision::CollisionChecker& checker,
+                                     const Eigen::Ref<const Eigen::VectorXd>& start,
+                                     const Eigen::Ref<const Eigen::VectorXd>& goal,
+                                     const std::vector<collision::AllowedTouch>& ignored,
+                                     const PlanOptions& options) {
+  if ((start - goal).cwiseAbs().maxCoeff() < kThere_rad) return JointTrajectory{};
+  const auto time = [&](const Way& way) {
     JointTrajectory all;
-    for (std::size_t i = first; i < last; ++i) {
+    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
       all = Concatenate(all, TimeLine(way[i], way[i + 1], chain.joint_names(), chain.limits(),
                                       options.approach_velocity));
     }
     return all;
   };
-  const auto first_violation = [&](const JointTrajectory& trajectory,
-                                   const std::vector<collision::AllowedTouch>& allowed) {
+  const auto first_violation = [&](const JointTrajectory& trajectory) {
     const TrajectoryPath path(trajectory, model, chain);
     return checker.FirstViolation(path, 0, trajectory.duration_s(), options.required_clearance_m,
-                                  allowed);
+                                  ignored);
   };
-  const Eigen::VectorXd all_joints = kinematics::FullJointVector(model, chain, start);
-  const bool touching =
-      checker.SmallestClearance(all_joints, ignored).distance_m < options.required_clearance_m &&
-      checker.SmallestClearance(all_joints, touches).distance_m >= options.required_clearance_m;
+  JointTrajectory straight = time({start, goal});
+  const std::optional<collision::Violation> in_the_way = first_violation(straight);
+  if (!in_the_way) return straight;
 
   std::vector<Way> ways;
   for (const double lift : kLifts_m) {
@@ -79,22 +76,9 @@ Result<Approach> PlanApproach(const kinematics::RobotModel& model, const kinemat
       }
     }
   }
-  const JointTrajectory straight = time({start, goal}, 0, 1);
-  const std::optional<collision::Violation> in_the_way = first_violation(straight, ignored);
-  if (!in_the_way) return Approach{straight, 0};
   for (const Way& way : ways) {
-    const std::size_t end = way.size() - 1;
-    if (!touching) {
-      JointTrajectory trajectory = time(way, 0, end);
-      if (!first_violation(trajectory, ignored)) return Approach{trajectory, 0};
-      continue;
-    }
-    // The first leg leads out of the touch; from its end on nothing is touched any more.
-    const JointTrajectory rise = time(way, 0, 1);
-    const JointTrajectory rest = time(way, 1, end);
-    if (!first_violation(rise, touches) && !first_violation(rest, ignored)) {
-      return Approach{Concatenate(rise, rest), rise.duration_s()};
-    }
+    JointTrajectory trajectory = time(way);
+    if (!first_violation(trajectory)) return trajectory;
   }
   return FailedPrecondition(
       "no free way from where the robot stands to the motion's first frame; "

@@ -360,29 +360,19 @@ class Planner {
     JointTrajectory skill = TimePath(prepared_.path.time_s, path.joints, chain_.joint_names(),
                                      chain_.limits(), options_.speed_scale, frame_time_s);
     AddHand(motion_, frame_time_s, skill);
-    const std::vector<std::string> touch_links = TouchLinks();
-    std::vector<collision::AllowedTouch> touches;
-    for (const demonstration::Contact& contact : motion_.contacts) {
-      for (const std::string& link : touch_links) touches.push_back({link, contact.object});
-    }
-    Result<Approach> approach =
-        PlanApproach(model_, chain_, checker_, start_, skill.positions.row(0).transpose(), touches,
+    const Result<JointTrajectory> approach =
+        PlanApproach(model_, chain_, checker_, start_, skill.positions.row(0).transpose(),
                      NotYet(options_.carries), options_);
     if (!approach.ok()) return approach.error();
-    const double offset = approach->trajectory.duration_s();
-    plan.trajectory = Concatenate(approach->trajectory, skill);
+    const double offset = approach->duration_s();
+    plan.trajectory = Concatenate(*approach, skill);
     plan.report.approach_s = offset;
     for (const double t : frame_time_s) plan.frame_time_s.push_back(offset + t);
     plan.report.time_stretch = skill.duration_s() / prepared_.path.time_s.back();
 
-    if (approach->rise_s > 0) {
-      for (const demonstration::Contact& contact : motion_.contacts) {
-        plan.touches.push_back({contact.object, 0, approach->rise_s});
-      }
-    }
     AddContacts(motion_, chain_, options_, frame_time_s, offset, plan);
     AddCarryWindows(motion_, chain_, options_, frame_time_s, offset, plan);
-    const std::vector<Stretch> stretches = MakeStretches(plan, touch_links);
+    const std::vector<Stretch> stretches = MakeStretches(plan, TouchLinks());
     const TrajectoryPath swept(plan.trajectory, model_, chain_);
     for (const Stretch& stretch : stretches) {
       const std::optional<collision::Violation> violation = checker_.FirstViolation(
@@ -409,8 +399,9 @@ class Planner {
     for (const demonstration::Contact& contact : motion_.contacts) {
       const auto near = [&](int frame) {
         const Eigen::Vector3d& tool = path[frame].translation;
-        return std::min((tool - path[contact.first].translation).norm(),
-                        (tool - path[contact.last].translation).norm()) <= options_.touch_margin_m;
+        return std::min({(tool - path[contact.first].translation).norm(),
+                         (tool - path[contact.last].translation).norm(),
+                         (tool - contact.base_p_contact).norm()}) <= options_.touch_margin_m;
       };
       int first = contact.first;
       while (first > 0 && near(first - 1)) --first;

@@ -12,9 +12,10 @@ namespace {
 using demonstration::SkillMotion;
 
 /// From before to after a contact, until the tool is `margin_m` away from where it was at both of
-/// the contact's ends: a press that goes deeper in between ends where it would without.
+/// the contact's ends, and from the contact's place: a press that goes deeper ends where it would
+/// without.
 std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
-                                     const kinematics::Chain& chain, double begin_s, double end_s,
+                                     const kinematics::Chain& chain, const ContactWindow& window,
                                      double margin_m) {
   Eigen::VectorXd q(chain.dof());
   Eigen::VectorXd velocity(chain.dof());
@@ -23,15 +24,16 @@ std::pair<double, double> TouchTimes(const JointTrajectory& trajectory,
     return chain.ToolPose(q).translation;
   };
   const std::vector<double>& time = trajectory.time_s;
-  const Eigen::Vector3d at_begin = tool_at(begin_s);
-  const Eigen::Vector3d at_end = tool_at(end_s);
+  const Eigen::Vector3d at_begin = tool_at(window.begin_s);
+  const Eigen::Vector3d at_end = tool_at(window.end_s);
   const auto near = [&](double t) {
     const Eigen::Vector3d tool = tool_at(t);
-    return std::min((tool - at_begin).norm(), (tool - at_end).norm()) <= margin_m;
+    return std::min({(tool - at_begin).norm(), (tool - at_end).norm(),
+                     (tool - window.base_p_contact).norm()}) <= margin_m;
   };
-  auto first = std::upper_bound(time.begin(), time.end(), begin_s) - 1;
+  auto first = std::upper_bound(time.begin(), time.end(), window.begin_s) - 1;
   while (first != time.begin() && near(*first)) --first;
-  auto last = std::lower_bound(time.begin(), time.end() - 1, end_s);
+  auto last = std::lower_bound(time.begin(), time.end() - 1, window.end_s);
   while (last + 1 != time.end() && near(*last)) ++last;
   return {*first, *last};
 }
@@ -67,7 +69,7 @@ void AddContacts(const SkillMotion& motion, const kinematics::Chain& chain,
     const ContactWindow window{contact.object, offset_s + frame_time_s[contact.first],
                                offset_s + frame_time_s[contact.last], contact.base_p_contact};
     const auto [begin_s, end_s] =
-        TouchTimes(plan.trajectory, chain, window.begin_s, window.end_s, options.touch_margin_m);
+        TouchTimes(plan.trajectory, chain, window, options.touch_margin_m);
     plan.touches.push_back({contact.object, std::max(offset_s, begin_s), end_s});
     plan.contacts.push_back(window);
   }
