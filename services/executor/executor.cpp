@@ -266,6 +266,7 @@ bool Executor::IsSettled() const {
   {
     const std::lock_guard lock(mutex_);
     if (is_publishing_ || !transitions_.empty()) return false;
+    if (following_ && !following_->IsSettled()) return false;
   }
   if (!teleoperation_->IsSettled()) return false;
   commands_->Flush();
@@ -362,9 +363,8 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
   {
     const std::lock_guard lock(mutex_);
     if (closing_) return Unavailable("the executor is shutting down");
-    if (teleoperation_->active()) return Refused(state_.load(), Event::kPlan, holder_);
   }
-  if (const Status rests = AwaitRest(); !rests.ok()) return rests;
+  if (const Status rests = AwaitRest(Event::kPlan); !rests.ok()) return rests;
   if (const std::optional<std::string> silence = SafetySilence()) return Unavailable(*silence);
   Status begun = Apply(Event::kPlan, "planning \"" + request.skill + "\"");
   if (!begun.ok()) return begun;
@@ -374,12 +374,13 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
   return {};
 }
 
-Status Executor::AwaitRest() {
+Status Executor::AwaitRest(Event event) {
   std::unique_lock lock(mutex_);
-  const auto waits = [this] { return !run_over_ && Next(state_.load(), Event::kPlan).has_value(); };
-  changed_.wait_for(lock, options_.rest_patience, [&] { return !waits(); });
-  if (run_over_) return {};
-  if (!waits()) return Refused(state_.load(), Event::kPlan, holder_);
+  const auto rests = [this] { return run_over_ && !teleoperation_->active(); };
+  const auto may = [&] { return Next(state_.load(), event).has_value(); };
+  changed_.wait_for(lock, options_.rest_patience, [&] { return rests() || !may(); });
+  if (!may()) return Refused(state_.load(), event, holder_);
+  if (rests()) return {};
   return Unavailable("the robot is still slowing down after " + holder_ + ", which is " +
                      std::string(ToString(state_.load())) + "; ask again");
 }
@@ -473,7 +474,9 @@ Result<api::ExecutionResult> Executor::Execute(
       const std::lock_guard lock(mutex_);
       following_ = following;
     }
-    following->Start();
+    following->Start([this] {
+      if (options_.on_taken) options_.on_taken();
+    });
     if (!clock_.SleepUntil(followed->start, stop)) {
       const std::lock_guard lock(mutex_);
       following_.reset();

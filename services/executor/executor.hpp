@@ -44,7 +44,8 @@ struct ExecutorOptions {
   FollowingOptions following = {};
   /// Without ircp/safety for so long nothing begins and a motion is stopped; 0: not asked for.
   Duration safety_patience = Duration::zero();
-  /// A plan that is asked for while the robot still slows down waits for so long, of real time.
+  /// A plan or teleoperation asked for while the robot still slows down waits for so long, of real
+  /// time.
   Duration rest_patience = std::chrono::seconds(3);
   /// Called on any thread when a joint state or an object's pose was taken in, and when a state was
   /// looked at: has_taken may say something else now.
@@ -120,8 +121,8 @@ class Executor final : public api::ExecutorApi {
   /// Takes the event, or refuses it. `run`: what begins with kStart.
   Status Apply(Event event, std::string detail, std::shared_ptr<MotionRun> run = nullptr);
   Status Begin(const api::ExecuteRequest& request);
-  /// Waits where the robot only has to come to rest.
-  Status AwaitRest();
+  /// Waits where the robot only has to come to rest before `event` can be taken.
+  Status AwaitRest(Event event);
   /// Asks for the motion and plans it; leaves kReady, or goes back to kIdle where there is none.
   /// `followed` gets what a motion that follows its target needs beside, but for the plan itself.
   Result<Planned> MakePlan(const api::ExecuteRequest& request,

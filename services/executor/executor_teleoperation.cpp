@@ -32,6 +32,7 @@ Status Executor::ConnectTeleoperation(ircp::Bus& bus) {
     }
     changed_.notify_all();
   };
+  host.released = [this] { WakeAll(); };
   host.on_settled = [this] {
     if (options_.on_taken) options_.on_taken();
   };
@@ -53,13 +54,14 @@ Status Executor::ConnectTeleoperation(ircp::Bus& bus) {
 Result<api::TeleoperationResult> Executor::Teleoperate(
     const api::TeleoperationRequest& request,
     const std::function<void(const api::TeleoperationFeedback&)>& feedback, std::stop_token stop) {
-  std::optional<Eigen::VectorXd> last_command;
   {
     const std::lock_guard lock(mutex_);
     if (closing_) return Unavailable("the executor is shutting down");
-    if (!run_over_ || teleoperation_->active()) {
-      return Refused(state_.load(), Event::kTeleoperate, holder_);
-    }
+  }
+  if (const Status rests = AwaitRest(Event::kTeleoperate); !rests.ok()) return rests.error();
+  std::optional<Eigen::VectorXd> last_command;
+  {
+    const std::lock_guard lock(mutex_);
     last_command = last_command_;
   }
   return teleoperation_->Run(request, feedback, stop, last_command);

@@ -64,7 +64,12 @@ Following::Following(const Clock& clock, Log& log, const FollowingPlanner& plann
   used_aim_ = aim_;
 }
 
-void Following::Start() {
+void Following::Start(std::function<void()> on_settled) {
+  on_settled_ = std::move(on_settled);
+  {
+    const std::lock_guard lock(seen_mutex_);
+    plans_ = true;
+  }
   thread_ = std::jthread([this](const std::stop_token& stop) { PlanLoop(stop); });
 }
 
@@ -202,21 +207,41 @@ std::optional<std::string> Following::Problem() const {
 
 // ---------------------------------------------------------------- planning anew
 
+bool Following::IsSettled() const {
+  const std::lock_guard lock(seen_mutex_);
+  return !plans_ || !(is_fresh_ || is_planning_);
+}
+
+bool Following::AwaitSight(const std::stop_token& stop) {
+  std::unique_lock lock(seen_mutex_);
+  if (!seen_changed_.wait(lock, stop, [this] { return is_fresh_; })) return false;
+  is_fresh_ = false;
+  is_planning_ = true;
+  return true;
+}
+
+void Following::SetIdle(bool over) {
+  {
+    const std::lock_guard lock(seen_mutex_);
+    is_planning_ = false;
+    plans_ = !over;
+  }
+  if (on_settled_) on_settled_();
+}
+
 void Following::PlanLoop(const std::stop_token& stop) {
   Duration last = clock_.Steady();
-  while (!stop.stop_requested()) {
-    {
-      std::unique_lock lock(seen_mutex_);
-      if (!seen_changed_.wait(lock, stop, [this] { return is_fresh_; })) return;
-      is_fresh_ = false;
-    }
+  while (AwaitSight(stop)) {
     const double now_s = path_time_s_.load(std::memory_order_acquire);
-    if (now_s > times_.contact_s - kLastPlan_s) return;
+    if (now_s > times_.contact_s - kLastPlan_s) break;
     const Duration now = clock_.Steady();
-    if (now - last < planner_.options().plan_again || began_ns_.load() < 0) continue;
-    last = now;
-    PlanOnce(stop);
+    if (now - last >= planner_.options().plan_again && began_ns_.load() >= 0) {
+      last = now;
+      PlanOnce(stop);
+    }
+    SetIdle(false);
   }
+  SetIdle(true);
 }
 
 void Following::PlanOnce(const std::stop_token& stop) {

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -109,7 +110,11 @@ class Following final : public PathFollower {
   ~Following() override;
 
   /// Plans anew beside the motion, whenever the target was seen, until it is destroyed.
-  void Start();
+  /// `on_settled`: called on that thread when IsSettled may say something else; may be null.
+  void Start(std::function<void()> on_settled = nullptr);
+  /// Whether no plan is being made, nor about to be, for what was seen: where time is simulated it
+  /// waits for that.
+  bool IsSettled() const;
   /// Plans anew once, as the thread of Start does; not beside it.
   void PlanOnce(const std::stop_token& stop);
   /// Something was seen.
@@ -133,6 +138,9 @@ class Following final : public PathFollower {
   };
   void SetAim(const TargetTrack& track);
   void PlanLoop(const std::stop_token& stop);
+  /// Waits until the target was seen anew; false when `stop` came first.
+  bool AwaitSight(const std::stop_token& stop);
+  void SetIdle(bool over);
   void Judge(double path_time_s, double residual_m, Duration now);
   Eigen::Vector3d Wanted(const FollowedPath& path, std::size_t frame, double part, Duration now);
   const TargetPress* press() const { return press_ ? &*press_ : nullptr; }
@@ -167,6 +175,9 @@ class Following final : public PathFollower {
   mutable std::mutex seen_mutex_;
   std::condition_variable_any seen_changed_;
   bool is_fresh_ = false;
+  bool plans_ = false;  ///< the thread runs, and will look at what is fresh
+  bool is_planning_ = false;
+  std::function<void()> on_settled_;
   std::vector<std::pair<Duration, Eigen::Vector3d>> seen_;
   std::jthread thread_;  ///< last
 };

@@ -3,6 +3,7 @@
 
 #include "executor/following.hpp"
 #include "exemplar/base/text.hpp"
+#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::executor {
 namespace {
@@ -184,6 +185,8 @@ Result<FollowingPlan> FollowingPlanner::Plan(const api::ExecuteRequest& request,
                                 "\" turns back too often: the touch takes " +
                                 FormatFixed(over_s - contact_s, 1) + " s");
     }
+    // Where time is simulated it stands meanwhile, as in all calls.
+    const ircp::TimeHold hold(clock_);
     Result<FollowingPlan> plan = PlanFor(request, *target, track, seen->second, contact,
                                          frame_time_s, std::nullopt, guarded, last_command, stop);
     if (!plan.ok()) return plan.error();

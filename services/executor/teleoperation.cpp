@@ -16,6 +16,8 @@ constexpr double kLastWords_s = 0.3;
 /// Steps that are further apart go on as if they were not.
 constexpr Duration kLongestStep = std::chrono::milliseconds(20);
 constexpr std::size_t kMostUnwatched = 1024;
+/// Of a session that is over, until its call has its figures.
+constexpr Duration kLastReport = std::chrono::seconds(1);
 
 Error Busy() { return FailedPrecondition("the robot is teleoperated already"); }
 
@@ -137,7 +139,7 @@ Result<api::TeleoperationResult> Teleoperation::Run(
     const api::TeleoperationRequest& request,
     const std::function<void(const api::TeleoperationFeedback&)>& feedback,
     const std::stop_token& stop, const std::optional<Eigen::VectorXd>& last_command) {
-  const std::unique_lock run(run_mutex_, std::try_to_lock);
+  const std::unique_lock run(run_mutex_, kLastReport);
   if (!run.owns_lock()) return Busy();
   Result<Session> session = Prepare(request, last_command);
   if (!session.ok()) return session.error();
@@ -425,6 +427,7 @@ void Teleoperation::FinishSession() {
   commands_.Flush();
   host_.over(Commanded());
   session_.store(kIdle);
+  host_.released();
   beat_.fetch_add(1);
   beat_.notify_all();
 }

@@ -45,6 +45,8 @@ struct TeleoperationHost {
   std::function<double()> speed;
   /// The robot rests where it was commanded last; nothing is commanded any more.
   std::function<void(const Eigen::VectorXd& commanded)> over;
+  /// After that: active() is false, the robot may belong to somebody else.
+  std::function<void()> released;
   /// Told when all that came may have been dealt with.
   std::function<void()> on_settled;
 };
@@ -141,7 +143,7 @@ class Teleoperation {
   const TeleoperationSettings settings_;
   const Duration period_;
 
-  std::mutex run_mutex_;  ///< held by the call that the mode belongs to
+  std::timed_mutex run_mutex_;  ///< held by the call that the mode belongs to
   std::mutex intake_mutex_;
   SuitIntake intake_;  ///< the network's thread, under intake_mutex_
   DeadMan dead_man_;

@@ -187,6 +187,48 @@ TEST_F(TeleoperationTest, TheRobotBelongsToOneAtATime) {
   EXPECT_TRUE(Finish().ok());
 }
 
+TEST_F(TeleoperationTest, BeginsOnceTheRobotRestsAfterACancel) {
+  Begin(RobotRig::Press());
+  Steps(60);
+  ASSERT_TRUE(executor_->Cancel().ok());
+  auto asked = std::async(std::launch::async, [this] {
+    Result<api::TeleoperationResult> result = executor_->Teleoperate(
+        {},
+        [this](const api::TeleoperationFeedback& now) {
+          const std::lock_guard lock(mutex_);
+          told_ = now;
+          heard_.notify_all();
+        },
+        stop_.get_token());
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+    heard_.notify_all();
+    return result;
+  });
+  EXPECT_EQ(Finish()->state, "aborted");
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = false;
+  }
+  Await([this] { return told_.has_value(); });
+  EXPECT_EQ(state(), "teleoperating");
+  stop_.request_stop();
+  Cycles(500);
+  const auto result = asked.get();
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_EQ(result->state, "aborted");
+}
+
+TEST_F(TeleoperationTest, MakesRoomForAPlanOnceTheRobotRests) {
+  On();
+  Follow();
+  ASSERT_TRUE(executor_->EndTeleoperation().ok());
+  auto plan = std::async(std::launch::async, [this] { return executor_->Plan(RobotRig::Press()); });
+  EXPECT_EQ(End()->state, "done");
+  const auto planned = plan.get();
+  EXPECT_TRUE(planned.ok()) << planned.error().message;
+}
+
 TEST_F(TeleoperationTest, HoldsWhenTheDeadManIsReleasedOrSilentOrTheSuitIs) {
   On();
   Follow();
