@@ -42,8 +42,9 @@ def test_a_target_that_moves_is_met_where_it_will_be(robot: exemplar.Client, mov
     # Met within half an inch while it went on.
     assert result.contact_error_m is not None
     assert result.contact_error_m < 0.0127
-    nearest = np.linalg.norm(result.tool[:, :3] - result.objects["target"].position, axis=1).min()
-    assert nearest < 0.03
+    # Along its rail, y, it was wherever the time took it that planning took.
+    across = (result.tool[:, :3] - result.objects["target"].position)[:, [0, 2]]
+    assert np.linalg.norm(across, axis=1).min() < 0.03
 
 
 def test_the_example_follows(robot: exemplar.Client, moving: MovingStation) -> None:

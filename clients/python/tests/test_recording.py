@@ -8,12 +8,14 @@ import struct
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 import exemplar
 import processes
-from conftest import ROOT, Station
+from conftest import DOMAIN, ROOT, Station
 
 needs_packages = pytest.mark.skipif(
     not importlib.util.find_spec("zstandard"), reason="the package zstandard is not installed"
@@ -104,15 +106,20 @@ def gateway(station: Station) -> str:
 
 
 @pytest.fixture(scope="module")
-def recording(station: Station, gateway: str, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    """Half a second of somebody's suit, as the recorder wrote it."""
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[pathlib.Path]:
+    """Half a second of somebody's suit, as the recorder of a station wrote it where nobody else reads a suit."""
     source = tmp_path_factory.mktemp("suit") / "suit.csv"
     rows = "".join(f"{k / 60},{0.01 * k}\n" for k in range(30))
     source.write_text("time_s,elbow_rad\n" + rows)
-    with exemplar.Client(recorder=station.recorder()) as client:
-        person = station.programs.start("exemplar-capture-suit", "--replay", source, "--record", "--name", "worn")
-        assert person.wait(60) == 0, station.programs.logs()
-        return pathlib.Path(client.recorder.status().file)
+    programs: Any = processes.Programs(source.parent, DOMAIN - 1)
+    try:
+        _, recorder = programs.recorder()
+        person = programs.start("exemplar-capture-suit", "--replay", source, "--record", "--name", "worn")
+        assert person.wait(60) == 0, programs.logs()
+        with exemplar.Client(recorder=recorder) as client:
+            yield pathlib.Path(client.recorder.status().file)
+    finally:
+        programs.end()
 
 
 @needs_packages
