@@ -18,6 +18,7 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 class BadInputTest : public LearningServiceTest {
  protected:
@@ -232,6 +233,10 @@ TEST_F(BadInputTest, QueriesThatCannotBeMeantAreRefusedByFieldAndValue) {
   const auto warned = skills().Query("press", 0, unused);
   ASSERT_TRUE(warned.ok()) << warned.error().message;
   EXPECT_THAT(warned->warnings, Contains(HasSubstr("joint_start is not used")));
+  unused.start = unused.objects[0].base_T_object;
+  const auto told = skills().Query("press", 0, unused);
+  ASSERT_TRUE(told.ok()) << told.error().message;
+  EXPECT_THAT(told->warnings, Not(Contains(HasSubstr("joint_start"))));
   ExpectAllTrialsKept("press", kPlaces.size());
 }
 

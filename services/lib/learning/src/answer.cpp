@@ -211,7 +211,9 @@ Result<demonstration::SkillMotion> Answer(const Skill& skill,
     situation.start_has_orientation = query.start_has_orientation;
   }
   situation.joint_start = std::move(*joint_start);
-  if (query.joint_start.has_value() && exemplars.joints() == 0) {
+  // Beside where the tool starts it says the same once more, as executors do for any skill.
+  if (query.joint_start.has_value() && exemplars.joints() == 0 &&
+      !situation.base_T_start.has_value()) {
     motion.warnings.push_back("joint_start is not used: the skill has no joints");
   }
   if (situation.joint_start.has_value() && !situation.base_T_start.has_value() &&
