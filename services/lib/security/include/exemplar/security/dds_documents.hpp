@@ -10,10 +10,10 @@
 
 namespace exemplar::security {
 
-/// Nobody takes part unauthenticated; discovery and liveliness are encrypted, and so are whole
-/// messages, which prove to each receiver whom they are from; every topic is subject to the
-/// permissions and encrypted with keys of its own that only its matched readers get; what commands
-/// the robot is so twice, in itself and as what carries it.
+/// Nobody takes part unauthenticated; discovery, liveliness and whole messages are encrypted; every
+/// topic is subject to the permissions, encrypted with keys of its own that only its matched
+/// readers get; what commands the robot is encrypted once more in itself, and proves its origin to
+/// each reader.
 std::string GovernanceXml();
 
 struct Permissions {
