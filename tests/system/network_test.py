@@ -193,9 +193,9 @@ class NetworkTest(NetworkCase):
 
     def test_a_cut_across_the_trials_end_loses_only_what_the_history_does_not_keep(self):
         program = self.build_cyclone_reader()
-        # 2.5 s in which the other reader joins and the cut begins, with few packets on their way, and 2 s in which more is sent
+        # 2.1 s in which the other reader joins and the cut begins, with few packets on their way, and 1.7 s in which more is sent
         # than is kept: the cut ends well before the 10 s after which either side forgets the other.
-        slow, rows, rate = 500, 500 + 4000, 20
+        slow, rows, rate = 500, 500 + 4000, 24
         _, server = self.recording("t")
         capture = self.start_capture(self.long_trial(rows, slow, slower=10), rate)
         reader = self.cyclone_reader(program, rows, quiet_s=15)
