@@ -439,7 +439,7 @@ std::vector<std::string> MemberFolderWarnings(const fs::path& folder, Stamp now)
   const Result<std::string> governance = VerifyDocument(*authority, *document);
   if (governance && Unsigned(*governance) != Unsigned(GovernanceXml())) {
     warnings.push_back(files.governance.string() +
-                       " is another version's: members do not meet those that have this one's, "
+                       " is another version's: members may not hear those that have this one's, "
                        "and may be less protected; issue all of them again");
   }
   return warnings;
