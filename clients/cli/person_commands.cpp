@@ -119,7 +119,7 @@ bool Agreed(const std::string& person, const std::stop_token& stop) {
   return Trim(typed) == person;
 }
 
-int Erase(const Session& session, Words words) {
+int Erase(const Session& session, const Words& words) {
   if (const Status valid = api::CheckPerson(words.person, "ID"); !valid) {
     return FailUsage(valid.error());
   }
