@@ -181,7 +181,7 @@ Status CarrySession::Perform(std::size_t index, const std::stop_token& stop) {
   }
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, places_.size());
-    Status started = recorder_->Start(name, performed->trial.source, stop);
+    Status started = recorder_->Start(name, performed->trial.source, sent(), stop);
     if (!started) return started;
   }
   control_->SetState("performing", trial);

@@ -138,8 +138,8 @@ Status PersonSession::Perform(std::size_t index, std::stop_token stop) {
   }
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, places_.size());
-    Status started =
-        WhileStill([&] { return recorder_->Start(name, performed->trial.source, stop); }, stop);
+    Status started = WhileStill(
+        [&] { return recorder_->Start(name, performed->trial.source, sent(), stop); }, stop);
     if (!started) return started;
   }
   control_->SetState("performing", trial);

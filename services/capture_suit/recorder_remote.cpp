@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "exemplar/base/text.hpp"
+
 namespace exemplar::capture_suit {
 namespace {
 
@@ -21,8 +23,12 @@ Result<RecorderRemote> RecorderRemote::Create(ircp::Bus& bus, const Clock& clock
 }
 
 Status RecorderRemote::Start(const std::string& name, const std::string& source,
-                             std::stop_token stop) {
-  std::map<std::string, std::string> arguments = {{"name", name}, {"source", source}};
+                             const std::vector<ircp::TopicCount>& streams, std::stop_token stop) {
+  std::vector<std::string> topics;
+  topics.reserve(streams.size());
+  for (const ircp::TopicCount& stream : streams) topics.push_back(stream.topic);
+  std::map<std::string, std::string> arguments = {
+      {"name", name}, {"source", source}, {"expect", Join(topics, ",")}};
   if (!demonstrator_.empty()) arguments["person"] = demonstrator_;
   return Call("start", std::move(arguments), std::move(stop));
 }

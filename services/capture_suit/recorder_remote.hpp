@@ -2,6 +2,7 @@
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "exemplar/ircp/control.hpp"
 
@@ -14,8 +15,10 @@ class RecorderRemote {
   static Result<RecorderRemote> Create(ircp::Bus& bus, const Clock& clock, std::uint64_t seed,
                                        const std::string& demonstrator = {});
 
-  /// After `stop` the recorder gets half a second to answer.
-  Status Start(const std::string& name, const std::string& source, std::stop_token stop);
+  /// The recording begins once the recorder hears all of `streams`; it is refused where that takes
+  /// more than five seconds. After `stop` the recorder gets half a second to answer.
+  Status Start(const std::string& name, const std::string& source,
+               const std::vector<ircp::TopicCount>& streams, std::stop_token stop);
   /// Asks in any case; after `stop` the recorder gets half a second to answer.
   Status Stop(std::stop_token stop);
 

@@ -84,7 +84,7 @@ Status ReplaySession::PlayOne(std::size_t index, const std::stop_token& stop) {
   if (Status status = BeFollowed(trial, stop); !status) return status;
   if (recorder_) {
     const std::string name = RecordingName(options_.name, index, trials_.size());
-    if (Status status = recorder_->Start(name, trial.source, stop); !status) return status;
+    if (Status status = recorder_->Start(name, trial.source, sent(), stop); !status) return status;
   }
   control_->SetState("playing", trial.source);
   const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);

@@ -76,6 +76,8 @@ TEST(ReplaySession, HasEachTrialRecordedUnderANameOfItsOwn) {
   ASSERT_EQ(station.commands.size(), 4U);
   EXPECT_EQ(station.commands[0].arguments.at("name"), "press-001");
   EXPECT_EQ(station.commands[0].arguments.at("source"), "wave.csv");
+  // Whatever else reads these topics: the recording begins once the recorder hears them.
+  EXPECT_EQ(station.commands[0].arguments.at("expect"), "ircp/suit,ircp/tactile,ircp/objects");
   EXPECT_EQ(station.commands[2].arguments.at("name"), "press-002");
   EXPECT_EQ(station.story.front(), "recorder start");
   EXPECT_EQ(station.story.back(), "recorder stop");
