@@ -47,8 +47,8 @@ void WriteCriteria(std::ostream& out, const char* kind, const std::vector<std::s
 
 }  // namespace
 
-// Whole messages carry no proof of origin: with it, a participant of Fast DDS 2.9.1 does not hear
-// itself.
+// Whole messages carry no proof of origin: with it, a program of Fast DDS 2.9.1 logs authentication
+// errors without end, probably of what it sent itself.
 std::string GovernanceXml() {
   std::ostringstream out;
   out << kHead << R"("omg_shared_ca_governance.xsd">
