@@ -77,6 +77,7 @@ bool RunningSession::StandUntilCommanded(const std::function<bool()>& lead,
   }
   stands_.store(false);
   lock.unlock();
+  time_->AskAnew();
   return lead();
 }
 

@@ -349,6 +349,29 @@ TEST_F(InStepNetwork, HandsSamplesOverAtTheNextMomentInAFixedOrder) {
   EXPECT_EQ(received.back(), Stamp() + milliseconds(3));
 }
 
+TEST_F(InStepNetwork, HandsOverAtTheNextMomentWhatWasSentWhileTimeStood) {
+  const Program suit = Make("suit");
+  const Program listener = Make("listener");
+  const auto leader = MakeLeader({.in_step_with = {"suit", "listener"}});
+  const auto joints = *suit.bus->MakeWriter<SuitSample>("suit");
+  std::vector<Stamp> received;
+  const auto reader = *listener.bus->MakeReader<SuitSample>(
+      [&](const SuitSample&, const Reception& from) { received.push_back(from.received); });
+  const auto lead = [&](int ms) {
+    return leader->Lead(milliseconds(ms), Stamp() + milliseconds(ms), {}, kAllHasCome, {});
+  };
+  ASSERT_TRUE(lead(0));
+  for (int ms = 1; ms < 30; ++ms) {
+    ASSERT_TRUE(lead(ms));
+    ASSERT_TRUE(joints->Write({}).ok());  // everybody has answered before
+    leader->AskAnew();
+    ASSERT_TRUE(lead(ms));
+    ASSERT_TRUE(lead(ms + 1));
+    ASSERT_EQ(received.size(), static_cast<std::size_t>(ms));
+    ASSERT_EQ(received.back(), Stamp() + milliseconds(ms + 1));
+  }
+}
+
 TEST_F(InStepNetwork, SettlesAfterEachSampleBeforeAnybodyActs) {
   const Program program = Make("program");
   const auto leader = MakeLeader({.in_step_with = {"program"}});
@@ -420,6 +443,7 @@ TEST_F(InStepNetwork, WaitsForTheFirstSampleOfAWriterThatCameWhileTimeStood) {
   ASSERT_TRUE(lead(0, 0));
   ASSERT_TRUE(lead(1, 0));
   const auto states = *bus_.MakeWriter<JointStateSample>(kRobotSource);
+  leader->AskAnew();
   ASSERT_TRUE(lead(1, 0));  // it stands
   std::atomic<int> said{0};
   bus_.LoseWhere([&](const std::string& topic, const Header& header) {

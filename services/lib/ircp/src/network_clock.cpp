@@ -28,6 +28,7 @@ struct Sleeper {
 
 /// What the leader said.
 struct Saying {
+  std::uint64_t number = 0;
   Duration time{0};
   Stamp stamp;
   std::vector<TopicCount> sent;
@@ -43,7 +44,7 @@ class Follower final : public NetworkClock {
   ~Follower() override {
     reader_.reset();
     replier_ = {};
-    if (writer_ && has_time_) Answer("left", told_.time);
+    if (writer_ && has_time_) Answer("left", told_, mail_.Sent());
   }
 
   Status Start(Bus& bus, const std::string& program) {
@@ -173,7 +174,7 @@ class Follower final : public NetworkClock {
   /// On a thread of the network: only hands over.
   void Take(const ClockSample& sample, const Reception& from) {
     if (sample.second.nanoseconds() < 0 || sample.third.nanoseconds() < 0) return;
-    Saying saying{Duration(sample.first.nanoseconds()), sample.header.stamp,
+    Saying saying{sample.header.seq, Duration(sample.first.nanoseconds()), sample.header.stamp,
                   CountsFromText(sample.peer)};
     if (sample.peer.empty()) {
       saying.sent = {{JointStateSample::kTopic, kRobotSource,
@@ -188,6 +189,7 @@ class Follower final : public NetworkClock {
         offset_ = steady_ - saying.time;
       }
       // What was sent until the moment begins counts, and not what was said of it later.
+      told_.number = saying.number;
       if (!is_asked_ || saying.time != told_.time) told_ = std::move(saying);
       is_asked_ = true;
       ++rechecks_;
@@ -223,23 +225,28 @@ class Follower final : public NetworkClock {
       MoveOn(lock);
       if (!is_complete) {
         lock.unlock();
-        Answer("here", told.time);
+        const std::vector<TopicCount> sent = mail_.Sent();
+        lock.lock();
+        // Complete meanwhile, it may have sent what belongs to this moment.
+        if (is_complete_) continue;
+        lock.unlock();
+        Answer("here", told, sent);
         lock.lock();
         continue;
       }
       if (!WaitUntilSettled(lock, stop, true)) return;
       lock.unlock();
       // The leader asks again, for one that is lost as well.
-      Answer("reached", told.time);
+      Answer("reached", told, mail_.Sent());
       lock.lock();
     }
   }
 
-  void Answer(const char* mode, Duration time) {
+  void Answer(const char* mode, const Saying& told, const std::vector<TopicCount>& sent) {
     ClockSample reply;
     reply.mode = mode;
-    reply.first = Stamp::FromNanoseconds(time.count());
-    const std::vector<TopicCount> sent = mail_.Sent();
+    reply.first = Stamp::FromNanoseconds(told.time.count());
+    reply.second = Stamp::FromNanoseconds(static_cast<std::int64_t>(told.number));
     std::uint64_t commands = 0;
     for (const TopicCount& count : sent) {
       if (count.topic == JointCommandSample::kTopic) commands += count.sent;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -16,6 +17,8 @@ namespace {
 
 /// Between two sayings of the same time: a follower that came later has not heard the first.
 constexpr Duration kAgain = std::chrono::milliseconds(100);
+/// Who does not say which one it answers.
+constexpr std::uint64_t kAnySaying = std::numeric_limits<std::uint64_t>::max();
 
 class Leader final : public TimeLeader {
  public:
@@ -82,6 +85,11 @@ class Leader final : public TimeLeader {
     return false;
   }
 
+  void AskAnew() override {
+    const std::lock_guard lock(mutex_);
+    oldest_saying_ = writer_->sent() + 1;
+  }
+
   void Recheck() override {
     { const std::lock_guard lock(mutex_); }
     changed_.notify_all();
@@ -98,13 +106,14 @@ class Leader final : public TimeLeader {
     bool was_heard = false;  ///< until then it is waited for without end
     bool in_step = false;
     Duration reached{-1};
+    std::uint64_t answered = 0;  ///< the saying's number
     std::vector<TopicCount> sent;
     std::vector<TopicCount> sent_before;  ///< when the time that is being led began
     std::vector<TopicCount> baseline;     ///< as it joined: nobody waits for what was sent before
   };
 
-  static bool HasReached(const Follower& follower, Duration time, const HasCome& has_come) {
-    if (follower.reached < time) return false;
+  bool HasReached(const Follower& follower, Duration time, const HasCome& has_come) const {
+    if (follower.reached < time || follower.answered < oldest_saying_) return false;
     return std::all_of(follower.sent.begin(), follower.sent.end(), [&](const TopicCount& count) {
       return count.sent <= CountOf(follower.baseline, count.topic, count.source) || has_come(count);
     });
@@ -150,6 +159,8 @@ class Leader final : public TimeLeader {
       follower.in_step = reply.mode != "left";
       follower.reached =
           reply.mode == "reached" ? Duration(reply.first.nanoseconds()) : Duration(-1);
+      const std::int64_t number = reply.second.nanoseconds();
+      follower.answered = number > 0 ? static_cast<std::uint64_t>(number) : kAnySaying;
     }
     changed_.notify_all();
   }
@@ -161,6 +172,7 @@ class Leader final : public TimeLeader {
   std::map<std::string, Follower> followers_;  ///< by program
   std::vector<std::string> lost_;
   Duration led_{-1};
+  std::uint64_t oldest_saying_ = 0;  ///< answers to those before it do not count
   bool news_ = false;  ///< somebody has joined, and is to hear at once that it is waited for
   std::unique_ptr<Writer<ClockSample>> writer_;
   std::unique_ptr<Reader> reader_;

@@ -5,10 +5,11 @@
 // The leader says {mode "sim", stamp: the simulated wall time, first: simulated time since its
 // start, second and third: how many joint states and how many poses of objects it has sent so far,
 // peer: how many samples everybody in step has sent so far} and says it again until everybody in
-// step has answered {mode "reached", first: that time, third: how many joint commands the follower
-// has sent so far, peer: likewise of all its topics}. Only then does it move time on. What was sent
-// at one moment is handed to its readers at the next, in a fixed order and before anybody acts
-// there (ircp/in_step_bus.hpp), so that the same run gives the same result to the last bit.
+// step has answered {mode "reached", first: that time, second: which saying it answers, by its
+// number in the header (0: not said), third: how many joint commands the follower has sent so far,
+// peer: likewise of all its topics}. Only then does it move time on. What was sent at one moment is
+// handed to its readers at the next, in a fixed order and before anybody acts there
+// (ircp/in_step_bus.hpp), so that the same run gives the same result to the last bit.
 //
 // A follower that is not complete yet answers "here", and time waits for it; one that ends says
 // "left".
@@ -120,6 +121,9 @@ class TimeLeader {
   /// reached it and all that they sent has come; false when `stop` came first.
   virtual bool Lead(Duration time, Stamp stamp, const std::vector<TopicCount>& sent,
                     const HasCome& has_come, std::stop_token stop) = 0;
+  /// While time stands, programs may act that answered long ago: no answer to what was said until
+  /// now counts any more, so that the next Lead returns with what they have sent since.
+  virtual void AskAnew() = 0;
   /// Wakes Lead to ask `has_come` again. Thread-safe.
   virtual void Recheck() = 0;
   /// Who was left behind since the last call.
