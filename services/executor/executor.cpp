@@ -306,6 +306,7 @@ ExecutorFigures Executor::figures() const {
   now.plans_refused = plans_refused_.load(std::memory_order_relaxed);
   now.commands_dropped = commands_->dropped();
   now.commands_failed = commands_->failed();
+  now.command_readers = commands_->matched_readers();
   now.cycles = cycles_.load(std::memory_order_relaxed);
   now.lateness_s = ToSeconds(Duration(lateness_ns_.load(std::memory_order_relaxed)));
   now.lateness_max_s = ToSeconds(Duration(lateness_max_ns_.load(std::memory_order_relaxed)));

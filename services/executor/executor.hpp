@@ -62,6 +62,7 @@ struct ExecutorFigures {
   std::uint64_t plans_refused = 0;
   std::uint64_t commands_dropped = 0;
   std::uint64_t commands_failed = 0;
+  int command_readers = 0;  ///< programs that hear the commands: the robot, a recorder
   std::uint64_t cycles = 0;
   double lateness_s = 0;  ///< summed over the cycles
   double lateness_max_s = 0;

@@ -28,6 +28,9 @@ std::vector<Metric> MetricsOf(const Executor& executor) {
                               [&executor] { return executor.figures().commands_dropped; }));
   metrics.push_back(CounterOf(prefix + "_commands_failed_total", "Commands the network refused",
                               [&executor] { return executor.figures().commands_failed; }));
+  metrics.push_back(GaugeOf(prefix + "_command_readers",
+                            "Readers that hear the joint commands: the robot, a recorder",
+                            [&executor] { return executor.figures().command_readers; }));
   metrics.push_back(CounterOf(prefix + "_cycles_total", "Cycles of the control loop",
                               [&executor] { return executor.figures().cycles; }));
   metrics.push_back(CounterOf(prefix + "_lateness_seconds_total",

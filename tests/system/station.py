@@ -30,6 +30,7 @@ class SimulatedStation:
     """`in_step`: what every simulator waits for. Simulated seconds add up in `simulated_s`, real ones in `running_s`."""
 
     STANDS_AFTER_S = 0.6
+    EXECUTOR_METRICS = "127.0.0.1:19773"
 
     def __init__(self, folder, domain, robot, scene, in_step, seed, metrics="127.0.0.1:19772"):
         folder.mkdir()
@@ -59,7 +60,7 @@ class SimulatedStation:
         self.learning = self.server("exemplar-learning", "--data-dir", self.folder / "skills", "--robot", self.robot, bus=False)
 
     def start_executor(self):
-        words = ["--robot", self.robot, "--scene", self.scene, "--learning", self.learning, "--clock", "network"]
+        words = ["--robot", self.robot, "--scene", self.scene, "--learning", self.learning, "--clock", "network", "--metrics", self.EXECUTOR_METRICS]
         self.executor = self.server("exemplar-executor", *words)
 
     def person(self, places, *words):
@@ -76,6 +77,11 @@ class SimulatedStation:
             return {topic["topic"] for topic in status["topics"]} >= set(topics)
 
         wait_for(known, f"the recorder to find {topics}: {self.programs.logs()}")
+
+    def commands_are_heard(self):
+        """By the robot and the recorder, as the executor sees it: what it sends before, nobody has."""
+        heard = lambda: metric(self.EXECUTOR_METRICS, "exemplar_executor_command_readers") >= 2
+        wait_for(heard, f"robot and recorder to hear the commands: {self.programs.logs()}")
 
     def time_s(self):
         return metric(self.metrics, "exemplar_simulator_time_seconds")
@@ -100,6 +106,7 @@ class SimulatedStation:
     def press(self, skill, target):
         """The robot carries the skill out, recorded; the answer."""
         self.wait_until_time_stands()
+        self.commands_are_heard()
         exemplar("record", "start", "--name", "execution", "--topic", "ircp/joint_command", "--wait", "60", "--server", self.recorder)
         with self.timed():
             done = exemplar("--server", self.executor, "skill", "execute", skill, "--object", target, "--wait")
