@@ -28,14 +28,9 @@ class TeleoperationTest : public RobotRig {
         });
   }
 
-  /// Teleoperation on a thread of its own; returns once it is on, or refused.
-  void On(const api::TeleoperationRequest& request = {}) {
-    {
-      const std::lock_guard lock(mutex_);
-      over_ = false;
-      told_.reset();
-    }
-    teleoperation_ = std::async(std::launch::async, [this, request] {
+  /// On a thread of its own; what it says and that it is over come to Await.
+  std::future<Result<api::TeleoperationResult>> Ask(const api::TeleoperationRequest& request) {
+    return std::async(std::launch::async, [this, request] {
       Result<api::TeleoperationResult> result = executor_->Teleoperate(
           request,
           [this](const api::TeleoperationFeedback& now) {
@@ -49,6 +44,16 @@ class TeleoperationTest : public RobotRig {
       heard_.notify_all();
       return result;
     });
+  }
+
+  /// Teleoperation on a thread of its own; returns once it is on, or refused.
+  void On(const api::TeleoperationRequest& request = {}) {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = false;
+      told_.reset();
+    }
+    teleoperation_ = Ask(request);
     Await([this] { return told_ || over_; });
   }
 
@@ -191,20 +196,7 @@ TEST_F(TeleoperationTest, BeginsOnceTheRobotRestsAfterACancel) {
   Begin(RobotRig::Press());
   Steps(60);
   ASSERT_TRUE(executor_->Cancel().ok());
-  auto asked = std::async(std::launch::async, [this] {
-    Result<api::TeleoperationResult> result = executor_->Teleoperate(
-        {},
-        [this](const api::TeleoperationFeedback& now) {
-          const std::lock_guard lock(mutex_);
-          told_ = now;
-          heard_.notify_all();
-        },
-        stop_.get_token());
-    const std::lock_guard lock(mutex_);
-    over_ = true;
-    heard_.notify_all();
-    return result;
-  });
+  auto asked = Ask({});
   EXPECT_EQ(Finish()->state, "aborted");
   {
     const std::lock_guard lock(mutex_);
