@@ -2,6 +2,9 @@
 
 #include <utility>
 
+#include "exemplar/base/text.hpp"
+#include "exemplar/ircp/status_values.hpp"
+
 namespace exemplar::capture_suit {
 namespace {
 
@@ -25,10 +28,7 @@ Result<std::unique_ptr<DeadMan>> DeadMan::Create(ircp::Bus& bus, const Clock& cl
   auto reader = bus.MakeReaderOn<ircp::StatusSample>(
       ircp::StatusTopic("executor"),
       [dead_man](const ircp::StatusSample& status, const ircp::Reception&) {
-        const bool on = status.state == "teleoperating";
-        // One from before the press says nothing of it.
-        dead_man->followed_.store(dead_man->held() && on && status.detail.starts_with("following"));
-        if (on && !status.detail.starts_with("holding")) dead_man->answered_.store(true);
+        dead_man->Hear(status);
       });
   if (!reader.ok()) return reader.error();
   made->executor_ = *std::move(reader);
@@ -58,12 +58,27 @@ void DeadMan::GoOnPressing() {
   turn_at_ = now + (press ? kPressedFor : kReleasedFor);
 }
 
+void DeadMan::Hear(const ircp::StatusSample& status) {
+  // Whoever joins is told the executor's last statuses, also those of presses before ours.
+  const auto press = status.values.find(ircp::kAnsweredPress);
+  const std::optional<long long> stamp_ns =
+      press == status.values.end() ? std::nullopt : ParseInteger(press->second);
+  bool ours = false;
+  {
+    const std::lock_guard lock(mutex_);
+    ours = held_ && stamp_ns && Stamp::FromNanoseconds(*stamp_ns) >= pressed_;
+  }
+  followed_.store(ours && status.detail.starts_with("following"));
+  if (ours && !status.detail.starts_with("holding")) answered_.store(true);
+}
+
 void DeadMan::Set(bool held) {
   const std::lock_guard lock(mutex_);
   const Duration now = clock_.Steady();
   if (now > turned_) held_before_ = held_;
   turned_ = now;
   held_ = held;
+  if (held) pressed_ = clock_.Now();
 }
 
 bool DeadMan::held() const {
@@ -78,6 +93,7 @@ bool DeadMan::HeldUntilNow() const {
 
 void DeadMan::Write(bool held) {
   ircp::SafetySample sample;
+  sample.header.stamp = clock_.Now();
   sample.dead_man_held = held;
   (void)writer_->Write(sample);  // the next one follows
 }

@@ -27,13 +27,15 @@ class DeadMan {
   void BeginToPress();
   void GoOnPressing();
   void Release() { Set(false); }
-  /// Whether the executor says that the robot follows.
+  /// Whether the executor says that the robot follows since the last press: what it said of an
+  /// earlier one, perhaps of somebody before us, is history.
   bool followed() const { return followed_.load(); }
   ircp::TopicCount sent() const;
 
  private:
   DeadMan(const Clock& clock, std::unique_ptr<ircp::Writer<ircp::SafetySample>> writer);
   void Set(bool held);
+  void Hear(const ircp::StatusSample& status);
   bool held() const;
   bool HeldUntilNow() const;  ///< before what was done at this very moment
   void Write(bool held);
@@ -45,6 +47,7 @@ class DeadMan {
   bool held_ = false;
   bool held_before_ = false;  ///< until turned_
   Duration turned_{-1};
+  Stamp pressed_;  ///< when it was held last
   std::atomic<bool> followed_{false};
   std::atomic<bool> answered_{false};  ///< the robot followed, or came to it, since BeginToPress
   Duration turn_at_{0};                ///< of the press or release that comes next

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "exemplar/base/text.hpp"
+#include "exemplar/ircp/status_values.hpp"
 
 namespace exemplar::executor {
 
@@ -93,6 +94,9 @@ Status Executor::Connect(ircp::Bus& bus) {
   });
   control_->SetValues([this] {
     std::map<std::string, std::string> values = {{"speed", FormatDouble(speed_.load())}};
+    if (const std::optional<Stamp> press = teleoperation_->AnsweredPress()) {
+      values[ircp::kAnsweredPress] = std::to_string(press->nanoseconds());
+    }
     const std::lock_guard lock(mutex_);
     if (!holder_.empty() && IsMoving(state_.load())) values["holder"] = holder_;
     if (run_ != nullptr && !run_over_) {

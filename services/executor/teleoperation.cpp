@@ -262,6 +262,11 @@ TeleoperationFigures Teleoperation::figures() const {
   return now;
 }
 
+std::optional<Stamp> Teleoperation::AnsweredPress() const {
+  if (!active() || phase_.load() == Phase::kHolding) return std::nullopt;
+  return dead_man_.pressed();
+}
+
 // ---------------------------------------------------------------- what comes in
 
 void Teleoperation::OnSuit(const ircp::SuitSample& sample, const ircp::Reception& reception) {

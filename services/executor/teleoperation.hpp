@@ -96,6 +96,9 @@ class Teleoperation {
   }
 
   TeleoperationFigures figures() const;
+  /// The stamp of the press that the robot moves by, on the presser's clock; nullopt while it
+  /// holds.
+  std::optional<Stamp> AnsweredPress() const;
   const ircp::Reader* suit_reader() const { return suit_reader_.get(); }
 
  private:

@@ -17,6 +17,7 @@ bool DeadMan::Take(const ircp::SafetySample& sample, Duration steady) {
     holder_ = sample.header.source;
     received_ns_.store(steady.count(), std::memory_order_relaxed);
     held_.store(true, std::memory_order_release);
+    pressed_ns_.store(sample.header.stamp.nanoseconds(), std::memory_order_release);
     presses_.fetch_add(1, std::memory_order_acq_rel);
     counts = true;
   } else if (holder_ == sample.header.source) {

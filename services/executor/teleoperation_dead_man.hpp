@@ -25,6 +25,10 @@ class DeadMan {
   /// Whether whoever holds it was heard within the patience; true while nobody does.
   bool heard(Duration steady) const;
   std::uint64_t presses() const { return presses_.load(std::memory_order_acquire); }
+  /// The stamp, on its writer's clock, of the press that counted last; 0 before the first.
+  Stamp pressed() const {
+    return Stamp::FromNanoseconds(pressed_ns_.load(std::memory_order_acquire));
+  }
 
  private:
   struct Source {
@@ -36,6 +40,7 @@ class DeadMan {
   std::string holder_;  ///< empty: nobody
   std::atomic<bool> held_{false};
   std::atomic<std::int64_t> received_ns_{0};  ///< from the holder
+  std::atomic<std::int64_t> pressed_ns_{0};
   std::atomic<std::uint64_t> presses_{0};
 };
 

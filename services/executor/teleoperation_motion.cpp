@@ -208,10 +208,14 @@ void TeleoperationMotion::TryEngage(const StepInput& input) {
   }
   if (!armed_at_) return;
   if (!input.dead_man_held) return refuse({Phase::kHolding, HoldReason::kReleased, 0, 0, 0});
+  // Where the operator stands counts from the press on: an earlier sample may be that of a suit
+  // which is gone.
+  const bool fresh = latest_.received >= *armed_at_;
   const std::optional<PhaseChange> wrong = WhyNoPosture(input.now);
-  if (wrong || !resting()) {
+  if (wrong || !fresh || !resting()) {
     if (input.now - *armed_at_ <= kArmed) return;
-    return refuse(wrong.value_or(PhaseChange{Phase::kHolding, reason_, 0, 0, 0}));
+    const HoldReason otherwise = fresh ? reason_ : HoldReason::kSuitSilent;
+    return refuse(wrong.value_or(PhaseChange{Phase::kHolding, otherwise, 0, 0, 0}));
   }
   driven_ = latest_.driven;
   MeasureBehind();

@@ -12,6 +12,7 @@ import { GrpcReflection } from "grpc-js-reflection-client";
 const [address, ...files] = process.argv.slice(2);
 const OK = grpc.status.OK;
 const PRECONDITION = grpc.status.FAILED_PRECONDITION;
+const PATIENCE_MS = 60_000; // for what a server learns by itself
 const { EXEMPLAR_TLS_CA, EXEMPLAR_TLS_CERT, EXEMPLAR_TLS_KEY, EXEMPLAR_TOKEN } = process.env;
 const read = (path) => (path ? readFileSync(path) : null);
 
@@ -201,7 +202,8 @@ const SCRIPT = {
   LearningDataService: data(),
   RecorderDataService: data(),
   TopicService: {
-    List: { send: {}, check: ([answer]) => assert.ok(answer.topics.some((one) => one.topic === "ircp/joint_state")) },
+    // Who has just started learns of the robot from the network.
+    List: { send: {}, until: ([answer]) => answer.topics.some((one) => one.topic === "ircp/joint_state") },
     Subscribe: {
       send: { topics: ["ircp/joint_state"], content: "CONTENT_JSON" },
       take: 2,
@@ -246,11 +248,17 @@ async function run(services, script) {
   for (const [name, calls] of Object.entries(script)) {
     const own = services[name];
     if (!own) continue;
-    for (const [method, { send, each, may = [OK], check, take }] of Object.entries(calls)) {
+    for (const [method, { send, each, may = [OK], check, take, until = () => true }] of Object.entries(calls)) {
       assert.ok(own.methods[method], `${name} has no ${method}`);
       for (const one of each ?? [send]) {
         const request = typeof one === "function" ? one() : one;
-        const { messages, error } = await call(own, own.methods[method], request, { take });
+        const deadline = Date.now() + PATIENCE_MS;
+        let { messages, error } = await call(own, own.methods[method], request, { take });
+        while (!error && !until(messages)) {
+          assert.ok(Date.now() < deadline, `${name}/${method} never answered what was waited for: ${JSON.stringify(messages)}`);
+          await new Promise((resolve) => setTimeout(resolve, 50));
+          ({ messages, error } = await call(own, own.methods[method], request, { take }));
+        }
         const code = error ? error.code : OK;
         assert.ok(may.includes(code), `${name}/${method}: ${code} ${error?.details}`);
         if (code === OK) check?.(messages);

@@ -242,6 +242,7 @@ class DeadManTest : public ::testing::Test {
   bool Say(const std::string& who, bool held, int at_ms, bool emergency = false) {
     ircp::SafetySample sample;
     sample.header.source = who;
+    sample.header.stamp = Stamp::FromNanoseconds(1000 + at_ms);
     sample.dead_man_held = held;
     sample.emergency_stop = emergency;
     return dead_man_.Take(sample, milliseconds(at_ms));
@@ -254,12 +255,15 @@ TEST_F(DeadManTest, CountsAPressAfterItWasHeardReleased) {
   EXPECT_FALSE(Say("suit", true, 50));
   EXPECT_FALSE(dead_man_.held());
   EXPECT_FALSE(Say("suit", false, 100));
+  EXPECT_EQ(dead_man_.pressed(), Stamp());
   EXPECT_TRUE(Say("suit", true, 150));
   EXPECT_TRUE(dead_man_.held());
   EXPECT_TRUE(dead_man_.heard(milliseconds(400)));
   EXPECT_FALSE(dead_man_.heard(milliseconds(401)));
+  EXPECT_FALSE(Say("suit", true, 380));
   EXPECT_FALSE(Say("suit", false, 420));
   EXPECT_FALSE(dead_man_.held());
+  EXPECT_EQ(dead_man_.pressed(), Stamp::FromNanoseconds(1150)) << "on the presser's own clock";
 }
 
 TEST_F(DeadManTest, DoesNotComeBackByItselfAfterASilence) {

@@ -141,6 +141,34 @@ TEST_F(StepTest, RefusesAPostureThatIsFarAway) {
   Follow();
 }
 
+TEST_F(StepTest, APressWaitsForWhereTheOperatorStandsNow) {
+  options_.suit_patience = std::chrono::seconds(2);
+  motion_ = Make();
+  motion_->Begin(robot_.home, 0);
+  operator_[0] += 1.5;
+  Steps(3);
+  suit_speaks_ = false;  // another suit takes over; the last sample would still do
+  Press();
+  Steps(40);
+  EXPECT_TRUE(motion_->changes().empty()) << "not refused for the posture of a suit that is gone";
+  operator_[0] -= 1.4;
+  suit_speaks_ = true;
+  Steps(1);
+  EXPECT_EQ(motion_->phase(), Phase::kApproaching);
+}
+
+TEST_F(StepTest, APressWithoutAnOperatorIsRefusedForThat) {
+  options_.suit_patience = std::chrono::seconds(2);
+  motion_ = Make();
+  motion_->Begin(robot_.home, 0);
+  Steps(3);
+  suit_speaks_ = false;
+  Press();
+  Steps(70);
+  EXPECT_EQ(motion_->phase(), Phase::kHolding);
+  EXPECT_EQ(last_change_.reason, HoldReason::kSuitSilent);
+}
+
 TEST_F(StepTest, HoldsWhenTheDeadManGoesAndDoesNotComeBackByItself) {
   Follow();
   operator_velocity_[1] = 0.4;
