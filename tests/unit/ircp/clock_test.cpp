@@ -249,6 +249,33 @@ TEST(ClockWatchTest, MeasuresTheClocksOfTheProgramsThatAnswerAndNoticesTheirJump
   EXPECT_TRUE((*watch)->TakeJumps().empty());
 }
 
+TEST(ClockWatchTest, CountsEveryJumpOfAClockAndTellsOfThemNowAndThen) {
+  ManualClock clock;
+  ShiftedClock ahead(clock);
+  QuietLog log;
+  MemoryBus bus(clock);
+  const auto suit = ClockResponder::Create(bus, ahead, "capture_suit");
+  const auto watch = ClockWatch::Create(bus, clock, log, "recorder");
+  ASSERT_TRUE(suit.ok() && watch.ok());
+  const auto until = [&](auto condition) {
+    return testing::Eventually([&] {
+      if (condition()) return true;
+      clock.Advance(std::chrono::milliseconds(200));
+      return false;
+    });
+  };
+  ASSERT_TRUE(until([&] { return !(*watch)->relations().empty(); }));
+  const Duration begin = clock.Steady();
+  std::uint64_t shifts = 0;
+  for (; shifts < 20 || clock.Steady() - begin < std::chrono::seconds(12); ++shifts) {
+    ahead.Shift(std::chrono::hours(shifts + 1));
+    ASSERT_TRUE(until([&] { return (*watch)->jumps() > shifts; }));
+  }
+  EXPECT_EQ((*watch)->jumps(), shifts);
+  EXPECT_GE(log.jumps, 2);
+  EXPECT_LT(log.jumps, static_cast<int>(shifts));
+}
+
 TEST(ClockWatchTest, NoticesItsOwnClocksJump) {
   ManualClock clock;
   ShiftedClock own(clock);

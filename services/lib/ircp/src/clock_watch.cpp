@@ -22,6 +22,8 @@ constexpr Duration kSilence = std::chrono::minutes(1);
 // Our two clocks are read one after the other; a pause between the two readings is no jump.
 constexpr Duration kLongestReading = std::chrono::microseconds(200);
 constexpr Duration kSmallestJump = std::chrono::milliseconds(5);
+/// A clock that jumps again and again is told of no more often than this.
+constexpr Duration kToldAgain = std::chrono::seconds(10);
 
 class Watch final : public ClockWatch {
  public:
@@ -142,12 +144,26 @@ class Watch final : public ClockWatch {
   /// Precondition: mutex_ is held.
   void Note(ClockJump jump) {
     ++jump_count_;
+    Tell(jump);
+    jumps_.push_back(std::move(jump));
+    if (jumps_.size() > kJumpsKept) jumps_.pop_front();
+  }
+
+  /// Precondition: mutex_ is held.
+  void Tell(const ClockJump& jump) {
+    const Duration now = clock_.Steady();
+    const auto [told, is_first] = told_.try_emplace(jump.participant, now);
+    if (!is_first && now - told->second < kToldAgain) return;
+    told->second = now;
     log_.Warning("a clock has jumped",
                  {{"program", jump.participant.empty() ? std::string("our own") : jump.program},
                   {"by_s", ToSeconds(jump.by)},
                   {"jumps", jump_count_}});
-    jumps_.push_back(std::move(jump));
-    if (jumps_.size() > kJumpsKept) jumps_.pop_front();
+    if (!is_first) {
+      log_.Info("a clock jumps again and again",
+                {{"program", jump.program},
+                 {"advice", "in simulated time start every program with --clock network"}});
+    }
   }
 
   const Clock& clock_;
@@ -159,6 +175,7 @@ class Watch final : public ClockWatch {
   std::optional<Duration> apart_;        ///< our wall clock minus our steady one
   std::uint64_t jump_count_ = 0;
   std::deque<ClockJump> jumps_;
+  std::map<std::string, Duration> told_;  ///< by participant: when its last jump was told of
   std::unique_ptr<Writer<ClockSample>> writer_;
   std::unique_ptr<Reader> reader_;
   std::jthread asker_;

@@ -30,7 +30,8 @@ struct ClockJump {
 };
 
 /// Asks once a second (faster while it knows little) and follows the clock of each program that
-/// answers. A clock that jumps, our own among them, is noticed, counted and logged. Thread-safe.
+/// answers. A clock that jumps, our own among them, is noticed, counted and logged, each at most
+/// every ten seconds. Thread-safe.
 class ClockWatch {
  public:
   /// Clock and log outlive it.
