@@ -70,6 +70,15 @@ Result<std::unique_ptr<Session>> MakeSession(ircp::Bus& bus, const Clock& clock,
 
 std::vector<Metric> MetricsOf(const Session& session) {
   return {ircp::SentMetric("exemplar_capture_suit", [&session] { return session.sent(); }),
+          Metric{"exemplar_capture_suit_readers", "Readers of each topic that trials are sent on",
+                 false,
+                 [&session] {
+                   std::vector<Metric::Value> values;
+                   for (const auto& [topic, count] : session.readers()) {
+                     values.push_back({{{"topic", topic}}, static_cast<double>(count)});
+                   }
+                   return values;
+                 }},
           CounterOf("exemplar_capture_suit_trials_total", "Trials sent to their end",
                     [&session] { return session.trials_ended(); })};
 }

@@ -256,4 +256,9 @@ std::vector<ircp::TopicCount> CarrySession::sent() const {
           {ircp::EndEffectorSample::kTopic, kSource, glove_->sent()}};
 }
 
+std::map<std::string, int> CarrySession::readers() const {
+  return {{ircp::SuitSample::kTopic, suit_->matched_readers()},
+          {ircp::EndEffectorSample::kTopic, glove_->matched_readers()}};
+}
+
 }  // namespace exemplar::capture_suit

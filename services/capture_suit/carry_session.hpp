@@ -44,6 +44,7 @@ class CarrySession final : public Session {
 
   Status Run(std::stop_token stop) override;
   std::vector<ircp::TopicCount> sent() const override;
+  std::map<std::string, int> readers() const override;
   std::uint64_t trials_ended() const override { return trials_ended_; }
 
  private:

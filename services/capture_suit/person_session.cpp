@@ -270,4 +270,9 @@ std::vector<ircp::TopicCount> PersonSession::sent() const {
   return counts;
 }
 
+std::map<std::string, int> PersonSession::readers() const {
+  if (suit_ == nullptr) return {};
+  return {{ircp::SuitSample::kTopic, suit_->matched_readers()}};
+}
+
 }  // namespace exemplar::capture_suit

@@ -44,6 +44,7 @@ class ReplaySession final : public Session {
   /// the readers have acknowledged. kCancelled soon after `stop`; a recording is stopped first.
   Status Run(std::stop_token stop) override;
   std::vector<ircp::TopicCount> sent() const override;
+  std::map<std::string, int> readers() const override { return streams_.readers(); }
   std::uint64_t trials_ended() const override { return trials_ended_; }
 
  private:

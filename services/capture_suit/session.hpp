@@ -1,6 +1,8 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "exemplar/base/result.hpp"
@@ -30,6 +32,8 @@ class Session {
   /// that runs is stopped first).
   virtual Status Run(std::stop_token stop) = 0;
   virtual std::vector<ircp::TopicCount> sent() const = 0;
+  /// How many read each topic that trials are sent on.
+  virtual std::map<std::string, int> readers() const = 0;
   virtual std::uint64_t trials_ended() const = 0;
 };
 

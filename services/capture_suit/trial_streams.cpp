@@ -71,6 +71,14 @@ std::vector<ircp::TopicCount> TrialStreams::sent() const {
   return counts;
 }
 
+std::map<std::string, int> TrialStreams::readers() const {
+  std::map<std::string, int> readers;
+  ForEachWriter(writers_, [&](const auto& writer, const char* topic) {
+    readers[topic] = writer.matched_readers();
+  });
+  return readers;
+}
+
 std::vector<std::string> TrialStreams::UnreadTopics() const {
   std::vector<std::string> topics;
   ForEachWriter(writers_, [&](const auto& writer, const char* topic) {

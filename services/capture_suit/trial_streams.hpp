@@ -1,6 +1,7 @@
 #pragma once
 // A recorded trial, sample by sample onto the topics that carry such samples.
 
+#include <map>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -30,6 +31,8 @@ class TrialStreams {
     return std::get<WriterPtr<ircp::SuitSample>>(writers_)->Write(sample);
   }
 
+  /// How many read each topic.
+  std::map<std::string, int> readers() const;
   /// Topics that nobody reads.
   std::vector<std::string> UnreadTopics() const;
   std::vector<ircp::TopicCount> sent() const;

@@ -134,12 +134,12 @@ Executor::~Executor() {
   state_reader_.reset();
   object_reader_.reset();
   safety_reader_.reset();
-  teleoperation_.reset();
   for (std::jthread* thread : {&control_thread_, &watch_thread_, &publish_thread_}) {
     thread->request_stop();
     if (thread->joinable()) thread->join();
   }
-  control_.reset();
+  control_.reset();  // it asks for what teleoperation knows
+  teleoperation_.reset();
 }
 
 // ---------------------------------------------------------------- state

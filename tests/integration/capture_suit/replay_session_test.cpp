@@ -14,6 +14,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 using testing::Station;
 
 /// Joints, touch and an object, each on time stamps of its own; two seconds.
@@ -114,6 +115,8 @@ TEST(ReplaySession, SaysWhenNobodyReads) {
   testing::KeptLog log;
   auto session = ReplaySession::Create(bus, clock, log, {MakeTrial(0)}, {});
   ASSERT_TRUE(session.ok());
+  EXPECT_THAT((*session)->readers(),
+              ElementsAre(Pair("ircp/objects", 0), Pair("ircp/suit", 0), Pair("ircp/tactile", 0)));
   EXPECT_TRUE((*session)->Run({}).ok());
   EXPECT_THAT(log.warnings(),
               ElementsAre("nobody reads topic=ircp/suit", "nobody reads topic=ircp/tactile",

@@ -1,7 +1,8 @@
 /* Reads ircp/end_effector with Cyclone DDS, reliably, and counts by the samples' own numbers.
    usage: reader DOMAIN PARTITION LAST QUIET_S
    Prints a line when the first sample comes. Ends once the number LAST has come and nothing is missing below it, or
-   after QUIET_S seconds without another sample. Prints: {"received": R, "first": F, "last": L, "missing": M} */
+   after QUIET_S seconds without another sample. Prints: {"received": R, "first": F, "last": L, "gaps": [[G, H], ...]},
+   where everything from G to H is missing. */
 #include <dds/dds.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,8 +60,16 @@ int main(int argc, char** argv) {
     fflush(stdout);
     if (count > 0) check(dds_return_loan(reader, samples, count), "loan");
   }
-  printf("{\"received\": %llu, \"first\": %llu, \"last\": %llu, \"missing\": %llu}\n", received, first, last,
-         received == 0 ? 0 : last - first + 1 - received);
+  printf("{\"received\": %llu, \"first\": %llu, \"last\": %llu, \"gaps\": [", received, first, last);
+  const char* comma = "";
+  for (unsigned long long seq = first; seq < last; ++seq) {
+    if (seen[seq]) continue;
+    const unsigned long long begin = seq;
+    while (!seen[seq + 1]) ++seq;
+    printf("%s[%llu, %llu]", comma, begin, seq);
+    comma = ", ";
+  }
+  printf("]}\n");
   dds_delete(participant);
   return 0;
 }
