@@ -52,6 +52,8 @@ void CheckRead(const google::protobuf::Message& message) {
   nan_is_nan.set_treat_nan_as_equal(true);
   google::protobuf::util::MessageDifferencer differencer;
   differencer.set_field_comparator(&nan_is_nan);
+  // A zero's sign is lost in JSON: -0 is set, 0 is not.
+  differencer.set_message_field_comparison(google::protobuf::util::MessageDifferencer::EQUIVALENT);
   Require(differencer.Compare(message, *again));
 }
 

@@ -8,6 +8,8 @@ import { LineSplitter } from "../src/lines";
 import { base64, objectsOf } from "../src/panels/skill";
 import { judgeTeleoperation } from "../src/panels/teleop";
 import { blend, positionsOf, rowMaxima, thin, tube } from "../src/tube";
+import * as THREE from "three";
+import { cornersOf, frameOf } from "../src/view/frame";
 import type { SkillReport, TeleoperationResult } from "../src/types";
 
 test("lines come whole wherever the pieces end, letters of several bytes too", () => {
@@ -127,4 +129,28 @@ test("how teleoperation ended is a sentence, with what happened in it", () => {
   equal(judgeTeleoperation(result), "Ended. The robot followed for 12.3 s of 20.0 s, held 1 time; touch up to 3.0 N, 14.0 mm clear at the nearest.");
   const stopped = judgeTeleoperation({ ...result, state: "protective_stop", detail: "stopped by a client", holds: "0", blocks: "2" });
   equal(stopped.startsWith("protective stop: stopped by a client. The robot followed for 12.3 s of 20.0 s, blocked 2 times;"), true);
+});
+
+test("a framed view shows all its points and wastes no room", () => {
+  const up = new THREE.Vector3(0, 0, 1);
+  const boxes = [new THREE.Box3(new THREE.Vector3(0, -0.5, 0), new THREE.Vector3(0.9, 0.4, 0.7)), new THREE.Box3(new THREE.Vector3(-3, 2, 0), new THREE.Vector3(-2.9, 2.1, 4))];
+  for (const box of boxes) {
+    for (const aspect of [0.5, 1, 2.2]) {
+      for (const towards of [new THREE.Vector3(0.9, -0.9, 0.66), new THREE.Vector3(-0.01, 0, 1.7)]) {
+        const points = cornersOf(box);
+        const frame = frameOf(points, towards, up, 38, aspect, 0.05);
+        const camera = new THREE.PerspectiveCamera(38, aspect, 0.02, 50);
+        camera.up.copy(up);
+        camera.position.copy(frame.position);
+        camera.lookAt(frame.target);
+        camera.updateMatrixWorld(true);
+        const seen = points.map((point) => point.clone().project(camera));
+        const [x, y] = [seen.map((p) => p.x), seen.map((p) => p.y)];
+        const [width, height] = [Math.max(...x) - Math.min(...x), Math.max(...y) - Math.min(...y)];
+        for (const p of seen) ok(Math.abs(p.x) < 0.9 + 1e-6 && Math.abs(p.y) < 0.9 + 1e-6, `${p.x} ${p.y}`);
+        ok(Math.max(width, height) > 1.7, `${width} by ${height} of 1.8 for ${aspect}`);
+      }
+    }
+  }
+  deepEqual(cornersOf(new THREE.Box3()), []);
 });

@@ -3,6 +3,7 @@ import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { ColladaLoader } from "three/examples/jsm/loaders/ColladaLoader.js";
 import URDFLoader, { type URDFRobot } from "urdf-loader";
 import type { RobotDescription, ScalarSeries } from "../types";
+import { cornersOf } from "./frame";
 
 const FILES = "/robot/files/";
 
@@ -59,6 +60,19 @@ export class Robot {
   /** rad or m; names that the URDF does not have are left out. */
   setJoints(names: readonly string[], positions: readonly number[]): void {
     this.apply(this.drawn, names, positions);
+  }
+
+  /** The corners of its parts' boxes, base frame. */
+  outline(): THREE.Vector3[] {
+    this.group.updateMatrixWorld(true);
+    const corners: THREE.Vector3[] = [];
+    this.group.traverse((part) => {
+      if (!(part instanceof THREE.Mesh)) return;
+      const geometry = part.geometry as THREE.BufferGeometry;
+      if (geometry.boundingBox === null) geometry.computeBoundingBox();
+      if (geometry.boundingBox !== null) corners.push(...cornersOf(geometry.boundingBox).map((corner) => corner.applyMatrix4(part.matrixWorld)));
+    });
+    return corners;
   }
 
   /** Where the drawn robot's tool is, base frame. */

@@ -2,6 +2,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { blend, positionsOf, rowMaxima } from "../tube";
 import type { RobotDescription, SceneBody, ScalarSeries, SkillMotion } from "../types";
+import { cornersOf, frameOf } from "./frame";
 import { Bundle, PathLine, Veil } from "./paths";
 import { Robot } from "./robot";
 import { dark, light, rgb, type Palette } from "./theme";
@@ -15,6 +16,8 @@ const STEP_M = 0.01;
 /** Nearer than this, an object and the place asked about share a label. */
 const ONE_LABEL_M = 0.03;
 const FARTHEST_M = 3;
+/** Of the picture, free at each edge of what is framed. */
+const MARGIN = 0.06;
 const TRAIL_MS = 120;
 const TRAIL_POINTS = 4000;
 
@@ -56,7 +59,8 @@ export class View {
   private changed = true;
   private drawn: (() => void)[] = [];
   private frames: number[] = [];
-  private focus = new THREE.Vector3(0.45, -0.1, 0.15);
+  private isHeld = false; // a person has turned the view
+  private isFramed = false; // around the answer that is shown
 
   constructor(private readonly box: HTMLElement) {
     const slow = isSoftware();
@@ -74,6 +78,7 @@ export class View {
     this.controls.maxDistance = 8;
     this.controls.minDistance = 0.15;
     this.controls.addEventListener("change", () => this.touch());
+    this.controls.addEventListener("start", () => (this.isHeld = true));
     this.home();
     this.listenForDrags(canvas);
     canvas.addEventListener("keydown", (event) => this.onKey(event));
@@ -93,8 +98,6 @@ export class View {
     if (this.robot !== undefined) this.scene.remove(this.robot.group);
     this.robot = await Robot.load(description, () => this.touch());
     this.scene.add(this.robot.group);
-    this.focus.copy(this.robot.tool()).multiplyScalar(0.95);
-    this.focus.z -= 0.05;
     this.home();
     this.setGround();
     return this.robot.missing;
@@ -150,6 +153,7 @@ export class View {
 
   setTrials(paths: readonly Float32Array[]): void {
     this.trials.set(paths);
+    if (!this.isHeld) this.home();
     this.touch();
   }
 
@@ -161,6 +165,8 @@ export class View {
   setAnswer(motion: SkillMotion | undefined): void {
     this.motion = motion;
     this.drawAnswer();
+    if (motion === undefined) this.isFramed = false;
+    if (motion !== undefined && !this.isFramed && !this.isHeld) this.home();
     this.touch();
   }
 
@@ -216,16 +222,26 @@ export class View {
     this.touch();
   }
 
+  /** All there is in one picture, from the side; until a person turns the view, it stays so. */
   home(): void {
-    this.controls.target.copy(this.focus);
-    this.camera.position.copy(this.focus).add(new THREE.Vector3(0.9, -0.9, 0.66));
-    this.controls.update();
-    this.touch();
+    this.isHeld = false;
+    this.isFramed = this.motion !== undefined;
+    this.lookFrom(new THREE.Vector3(0.9, -0.9, 0.66));
   }
 
   fromAbove(): void {
-    this.controls.target.copy(this.focus);
-    this.camera.position.copy(this.focus).add(new THREE.Vector3(-0.01, 0, 1.7));
+    this.isHeld = true;
+    this.lookFrom(new THREE.Vector3(-0.01, 0, 1.7));
+  }
+
+  private lookFrom(towards: THREE.Vector3): void {
+    const points = this.robot?.outline() ?? [];
+    for (const handle of this.handles.values()) points.push(handle.group.position);
+    for (const path of [this.trials.lines, this.answer.group]) points.push(...cornersOf(new THREE.Box3().setFromObject(path)));
+    if (points.length === 0) points.push(...cornersOf(new THREE.Box3(new THREE.Vector3(0, -0.6, 0), new THREE.Vector3(0.9, 0.4, 0.6))));
+    const frame = frameOf(points, towards, this.camera.up, this.camera.fov, this.camera.aspect, MARGIN);
+    this.controls.target.copy(frame.target);
+    this.camera.position.copy(frame.position);
     this.controls.update();
     this.touch();
   }
@@ -289,6 +305,7 @@ export class View {
     this.camera.fov = width < height ? 52 : 38;
     this.camera.updateProjectionMatrix();
     this.renderer.setSize(width, height);
+    if (!this.isHeld) this.home();
     this.touch();
   }
 
