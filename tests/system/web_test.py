@@ -284,7 +284,7 @@ class WebTest(unittest.TestCase):
         page("says", of="#learn-said", text="3 trials stored")
         page("click", of="#learn")
         page("says", of="#learn-said", text="Version 1 learned from 3 trials")
-        self.assertIn("second", page("text", of="#skill"))
+        page("says", of="#skill", text="second")
         page("click", of="#learn-box summary")
         subprocess.run([BINARIES / "exemplar", "--server", self.address, "skill", "delete", "second"], check=True, timeout=30)
         wait_for(lambda: "second" not in page("text", of="#skill"), "the page to see it gone")
@@ -350,6 +350,7 @@ class WebTest(unittest.TestCase):
     # ---- a secured one ----
 
     def test_a_secured_page_wants_a_login_and_its_own_token(self):
+        self.ready()
         station = self.folder / "station"
         security = lambda *words: subprocess.run([BINARIES / "exemplar", "security", *words], check=True, capture_output=True, text=True, cwd=self.folder).stdout
         security("init", station, "--station", "test")
