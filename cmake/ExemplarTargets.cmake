@@ -88,6 +88,6 @@ function(exemplar_test name)
   exemplar_use_test_headers(${name})
   target_compile_definitions(${name} PRIVATE
     EXEMPLAR_SOURCE_DIR="${CMAKE_SOURCE_DIR}" EXEMPLAR_BINARY_DIR="${CMAKE_BINARY_DIR}")
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}."
+  gtest_discover_tests(${name} NO_PRETTY_VALUES DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}."
     DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
 endfunction()
