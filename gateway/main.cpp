@@ -4,6 +4,7 @@
 #include "exemplar/bus/codec.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/bus/station_clock.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
@@ -34,15 +35,7 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(common, "gateway");
-  bus::ParticipantOptions network{.domain = common.domain,
-                                  .station = common.station,
-                                  .name = kName,
-                                  .interfaces = common.interfaces,
-                                  .peers = common.peers,
-                                  .discovery_servers = common.discovery_servers,
-                                  .best_effort_topics = common.best_effort,
-                                  .security = common.security,
-                                  .log = log.get()};
+  bus::ParticipantOptions network = program::NetworkOf(common, kName, log.get());
   auto time = bus::StationClock::Create(common.clock, network, "gateway", signals.token());
   if (!time) return program::Fail(kName, time.error());
   const Clock& clock = **time;

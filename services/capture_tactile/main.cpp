@@ -4,6 +4,7 @@
 #include "capture_tactile/session.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/bus/station_clock.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 
@@ -22,15 +23,7 @@ int main(int argc, char** argv) {
 
   const program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "capture-tactile");
-  bus::ParticipantOptions network{.domain = options.common().domain,
-                                  .station = options.common().station,
-                                  .name = kName,
-                                  .interfaces = options.common().interfaces,
-                                  .peers = options.common().peers,
-                                  .discovery_servers = options.common().discovery_servers,
-                                  .best_effort_topics = options.common().best_effort,
-                                  .security = options.common().security,
-                                  .log = log.get()};
+  bus::ParticipantOptions network = program::NetworkOf(options.common(), kName, log.get());
   auto station_clock = bus::StationClock::Create(options.common().clock, network, "capture_tactile",
                                                  signals.token());
   if (!station_clock) return program::Fail(kName, station_clock.error());

@@ -4,6 +4,7 @@
 #include "capture_vision/session.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/bus/station_clock.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 
@@ -21,16 +22,8 @@ int main(int argc, char** argv) {
   const std::unique_ptr<Log> log = program::MakeLog(options.common(), "capture-vision");
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene) return program::Fail(kName, scene.error());
-  bus::ParticipantOptions network{.domain = options.common().domain,
-                                  .station = options.common().station,
-                                  .name = kName,
-                                  .interfaces = options.common().interfaces,
-                                  .peers = options.common().peers,
-                                  .discovery_servers = options.common().discovery_servers,
-                                  .best_effort_topics = options.common().best_effort,
-                                  .shared_memory_bytes = bus::kPictureSharedMemoryBytes,
-                                  .security = options.common().security,
-                                  .log = log.get()};
+  bus::ParticipantOptions network = program::NetworkOf(options.common(), kName, log.get());
+  network.shared_memory_bytes = bus::kPictureSharedMemoryBytes;
   auto station_clock =
       bus::StationClock::Create(options.common().clock, network, "capture_vision", signals.token());
   if (!station_clock) return program::Fail(kName, station_clock.error());

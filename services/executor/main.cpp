@@ -9,6 +9,7 @@
 #include "executor/realtime.hpp"
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/bus/station_clock.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
@@ -144,15 +145,7 @@ int main(int argc, char** argv) {
   const auto clients = rpc::Connect(
       {.server = learning, .request_id = "executor", .credentials = options.common().client});
   if (!clients.ok()) return program::Fail(kName, clients.error());
-  bus::ParticipantOptions network{.domain = options.common().domain,
-                                  .station = options.common().station,
-                                  .name = kName,
-                                  .interfaces = options.common().interfaces,
-                                  .peers = options.common().peers,
-                                  .discovery_servers = options.common().discovery_servers,
-                                  .best_effort_topics = options.common().best_effort,
-                                  .security = options.common().security,
-                                  .log = log.get()};
+  bus::ParticipantOptions network = program::NetworkOf(options.common(), kName, log.get());
   auto station_clock =
       bus::StationClock::Create(options.common().clock, network, "executor", signals.token());
   if (!station_clock.ok()) return program::Fail(kName, station_clock.error());

@@ -4,6 +4,7 @@
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/bus/station_clock.hpp"
 #include "exemplar/ircp/clock_watch.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "exemplar/rpc/call_log.hpp"
@@ -27,16 +28,8 @@ int main(int argc, char** argv) {
 
   program::Signals signals;
   const std::unique_ptr<Log> log = program::MakeLog(common, "recorder");
-  bus::ParticipantOptions network{.domain = common.domain,
-                                  .station = common.station,
-                                  .name = kName,
-                                  .interfaces = common.interfaces,
-                                  .peers = common.peers,
-                                  .discovery_servers = common.discovery_servers,
-                                  .best_effort_topics = common.best_effort,
-                                  .shared_memory_bytes = bus::kPictureSharedMemoryBytes,
-                                  .security = common.security,
-                                  .log = log.get()};
+  bus::ParticipantOptions network = program::NetworkOf(common, kName, log.get());
+  network.shared_memory_bytes = bus::kPictureSharedMemoryBytes;
   auto station_clock =
       bus::StationClock::Create(common.clock, network, "recorder", signals.token());
   if (!station_clock) return program::Fail(kName, station_clock.error());

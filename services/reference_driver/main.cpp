@@ -5,6 +5,7 @@
 #include "exemplar/bus/participant.hpp"
 #include "exemplar/ircp/control.hpp"
 #include "exemplar/kinematics/robot_description.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "reference_driver/driver.hpp"
@@ -26,16 +27,7 @@ int main(int argc, char** argv) {
   const auto robot = kinematics::ReadRobotDescription(robot_folder);
   if (!robot.ok()) return program::Fail(kName, robot.error());
   auto participant =
-      bus::Participant::Create({.domain = options.common().domain,
-                                .station = options.common().station,
-                                .name = kName,
-                                .interfaces = options.common().interfaces,
-                                .peers = options.common().peers,
-                                .discovery_servers = options.common().discovery_servers,
-                                .best_effort_topics = options.common().best_effort,
-                                .security = options.common().security,
-                                .clock = &clock,
-                                .log = log.get()});
+      bus::Participant::Create(program::NetworkOf(options.common(), kName, log.get()));
   if (!participant.ok()) return program::Fail(kName, participant.error());
 
   std::mutex mutex;  // between the network's thread and the loop

@@ -1,6 +1,7 @@
 // exemplar-simulator: a robot, a table and buttons in MuJoCo, on the network like the real ones.
 
 #include "exemplar/bus/participant.hpp"
+#include "exemplar/program/network.hpp"
 #include "exemplar/program/options.hpp"
 #include "exemplar/program/runtime.hpp"
 #include "simulator/metrics.hpp"
@@ -83,18 +84,9 @@ int main(int argc, char** argv) {
   if (!robot) return program::Fail(kName, robot.error());
   const auto scene = scene::ReadDescription(scene_file);
   if (!scene) return program::Fail(kName, scene.error());
-  bus::ParticipantOptions network{
-      .domain = options.common().domain,
-      .station = options.common().station,
-      .name = kName,
-      .interfaces = options.common().interfaces,
-      .peers = options.common().peers,
-      .discovery_servers = options.common().discovery_servers,
-      .best_effort_topics = options.common().best_effort,
-      .security = options.common().security,
-      .clock = &clock,
-      .stamps_all = settings.pace != 1 || !settings.in_step_with.empty(),
-      .log = log.get()};
+  bus::ParticipantOptions network = program::NetworkOf(options.common(), kName, log.get());
+  network.clock = &clock;
+  network.stamps_all = settings.pace != 1 || !settings.in_step_with.empty();
   auto participant = bus::Participant::Create(network);
   if (!participant) return program::Fail(kName, participant.error());
   std::unique_ptr<bus::Participant> pictures;

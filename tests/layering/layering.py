@@ -46,7 +46,7 @@ LIBRARIES = {
     "figures": ["base", "geometry", "learning"],
     "http": ["base"],
     "security": ["base"],
-    "program": ["base", "security"],
+    "program": ["base", "security", "bus"],
     "bus": ["base", "geometry", "demonstration", "ircp", "recording", "security"],
     "backup": ["base", "api", "security"],
     "rpc": ["base", "geometry", "demonstration", "learning", "api", "security"],
