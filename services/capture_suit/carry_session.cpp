@@ -1,21 +1,17 @@
 #include "capture_suit/carry_session.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "capture_suit/places.hpp"
 #include "capture_suit/session_parts.hpp"
 #include "exemplar/base/text.hpp"
-#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::capture_suit {
 namespace {
 
 constexpr const char* kSource = "suit";
-constexpr Duration kPollInterval = std::chrono::milliseconds(20);
-constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
-constexpr double kWayToStart = 1.0;                                     // s
+constexpr double kWayToStart = 1.0;  // s
 /// The object is held this much above its middle, so that the fingertips stay off the table.
 constexpr double kAboveMiddle_m = 0.008;
 /// And let go so much above where it will stand.
@@ -46,8 +42,6 @@ double HalfHeight(const kinematics::Shape& shape) {
   if (const auto* sphere = std::get_if<kinematics::Sphere>(&shape)) return sphere->radius;
   return 0;
 }
-
-Error Cancelled() { return {ErrorCode::kCancelled, "stopped before the last trial had ended"}; }
 
 }  // namespace
 
@@ -127,15 +121,10 @@ Result<std::unique_ptr<CarrySession>> CarrySession::Create(
 
 Status CarrySession::Run(std::stop_token stop) {
   // The simulated robot, and the recorder where there is one.
-  const int wanted = recorder_ ? 2 : 1;
-  {
-    const ircp::TimeHold hold(clock_);
-    const Clock& real = ircp::RealTimeOf(clock_);
-    const Duration deadline = real.Steady() + kReaderTimeout;
-    while ((suit_->matched_readers() < wanted || glove_->matched_readers() < wanted) &&
-           real.Steady() < deadline) {
-      if (!real.SleepFor(kPollInterval, stop)) return Cancelled();
-    }
+  if (Status there = AwaitReaders(
+          clock_, log_, [this] { return readers(); }, recorder_ ? 2 : 1, stop);
+      !there) {
+    return there;
   }
   if (Status status = Send(posture_, 1); !status) return status;
   for (std::size_t i = 0; i < places_.size(); ++i) {
@@ -213,17 +202,9 @@ Status CarrySession::Perform(std::size_t index, const std::stop_token& stop) {
 
 Status CarrySession::MoveTo(const Eigen::VectorXd& goal, double seconds,
                             const std::stop_token& stop) {
-  const Eigen::VectorXd from = posture_;
-  const int steps = std::max(1, static_cast<int>(std::lround(seconds * options_.person.rate_hz)));
-  const Duration start = clock_.Steady();
-  for (int k = 1; k <= steps; ++k) {
-    if (!clock_.SleepUntil(start + FromSeconds(k / options_.person.rate_hz), stop)) {
-      return Cancelled();
-    }
-    const double s = static_cast<double>(k) / steps;
-    if (Status status = Send(from + s * s * (3 - 2 * s) * (goal - from), 1); !status) return status;
-  }
-  return {};
+  return Glide(
+      clock_, posture_, goal, seconds, options_.person.rate_hz,
+      [this](const Eigen::VectorXd& posture) { return Send(posture, 1); }, stop);
 }
 
 Status CarrySession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture, double open) {
@@ -242,13 +223,12 @@ Status CarrySession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture, doub
 }
 
 bool CarrySession::WaitForAcknowledgments(const std::stop_token& stop) {
-  const Clock& real = ircp::RealTimeOf(clock_);
-  const Duration deadline = real.Steady() + kAcknowledgeTimeout;
-  while (!suit_->WaitForAcknowledgments(kAcknowledgeSlice) ||
-         !glove_->WaitForAcknowledgments(kAcknowledgeSlice)) {
-    if (stop.stop_requested() || real.Steady() >= deadline) return false;
-  }
-  return true;
+  return AwaitAcknowledgments(
+      clock_,
+      [this](Duration slice) {
+        return suit_->WaitForAcknowledgments(slice) && glove_->WaitForAcknowledgments(slice);
+      },
+      stop);
 }
 
 std::vector<ircp::TopicCount> CarrySession::sent() const {

@@ -1,21 +1,17 @@
 #include "capture_suit/person_session.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "capture_suit/places.hpp"
 #include "capture_suit/session_parts.hpp"
 #include "exemplar/base/text.hpp"
-#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::capture_suit {
 namespace {
 
 constexpr const char* kSource = "suit";
-constexpr Duration kPollInterval = std::chrono::milliseconds(20);
-constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
-constexpr double kWayToStart = 1.0;                                     // s
+constexpr double kWayToStart = 1.0;      // s
 constexpr double kBeyondTravel = 0.003;  // m, as one presses who wants to feel the stop
 
 Result<scene::Button> FindButton(const scene::Description& scene, const std::string& name) {
@@ -31,8 +27,6 @@ Result<scene::Button> FindButton(const scene::Description& scene, const std::str
       "the scene has no button \"" + name + '"' + (near ? "; did you mean \"" + *near + "\"?" : ""),
       "object");
 }
-
-Error Cancelled() { return {ErrorCode::kCancelled, "stopped before the last trial had ended"}; }
 
 }  // namespace
 
@@ -92,7 +86,12 @@ Result<std::unique_ptr<PersonSession>> PersonSession::Create(
 }
 
 Status PersonSession::Run(std::stop_token stop) {
-  if (suit_) WaitForReaders(stop);
+  // The simulated robot, and the recorder where there is one.
+  if (Status there = AwaitReaders(
+          clock_, log_, [this] { return readers(); }, recorder_ ? 2 : 1, stop);
+      !there) {
+    return there;
+  }
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (stop.stop_requested()) return Cancelled();
     if (Status status = PutObject(*simulator_, button_.name, places_[i], stop); !status)
@@ -216,17 +215,9 @@ Status PersonSession::BeFollowed(const std::stop_token& stop) {
 
 Status PersonSession::MoveTo(const Eigen::VectorXd& goal, double seconds,
                              const std::stop_token& stop) {
-  const Eigen::VectorXd from = posture_;
-  const int steps = std::max(1, static_cast<int>(std::lround(seconds * options_.person.rate_hz)));
-  const Duration start = clock_.Steady();
-  for (int k = 1; k <= steps; ++k) {
-    if (!clock_.SleepUntil(start + FromSeconds(k / options_.person.rate_hz), stop)) {
-      return Cancelled();
-    }
-    const double s = static_cast<double>(k) / steps;
-    if (Status status = Send(from + s * s * (3 - 2 * s) * (goal - from)); !status) return status;
-  }
-  return {};
+  return Glide(
+      clock_, posture_, goal, seconds, options_.person.rate_hz,
+      [this](const Eigen::VectorXd& posture) { return Send(posture); }, stop);
 }
 
 Status PersonSession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture) {
@@ -238,29 +229,9 @@ Status PersonSession::Send(const Eigen::Ref<const Eigen::VectorXd>& posture) {
   return suit_->Write(std::move(sample));
 }
 
-void PersonSession::WaitForReaders(const std::stop_token& stop) {
-  // The simulated robot, and the recorder where there is one.
-  const int wanted = recorder_ ? 2 : 1;
-  const ircp::TimeHold hold(clock_);
-  const Clock& real = ircp::RealTimeOf(clock_);
-  const Duration deadline = real.Steady() + kReaderTimeout;
-  while (suit_->matched_readers() < wanted && real.Steady() < deadline) {
-    if (!real.SleepFor(kPollInterval, stop)) return;
-  }
-  if (suit_->matched_readers() < wanted) {
-    log_.Warning("fewer readers than expected", {{"topic", ircp::SuitSample::kTopic},
-                                                 {"readers", suit_->matched_readers()},
-                                                 {"expected", wanted}});
-  }
-}
-
 bool PersonSession::WaitForAcknowledgments(const std::stop_token& stop) {
-  const Clock& real = ircp::RealTimeOf(clock_);
-  const Duration deadline = real.Steady() + kAcknowledgeTimeout;
-  while (!suit_->WaitForAcknowledgments(kAcknowledgeSlice)) {
-    if (stop.stop_requested() || real.Steady() >= deadline) return false;
-  }
-  return true;
+  return AwaitAcknowledgments(
+      clock_, [this](Duration slice) { return suit_->WaitForAcknowledgments(slice); }, stop);
 }
 
 std::vector<ircp::TopicCount> PersonSession::sent() const {

@@ -64,7 +64,6 @@ class PersonSession final : public Session {
   /// Presses the dead-man and waits for the robot, where there is one to wait for.
   Status BeFollowed(const std::stop_token& stop);
   Status Send(const Eigen::Ref<const Eigen::VectorXd>& posture);
-  void WaitForReaders(const std::stop_token& stop);
   bool WaitForAcknowledgments(const std::stop_token& stop);
 
   const Clock& clock_;

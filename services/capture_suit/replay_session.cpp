@@ -9,7 +9,6 @@
 #include "capture_suit/session_parts.hpp"
 #include "exemplar/base/text.hpp"
 #include "exemplar/demonstration/csv.hpp"
-#include "exemplar/ircp/simulated_time.hpp"
 
 namespace exemplar::capture_suit {
 namespace {
@@ -68,7 +67,11 @@ Result<std::unique_ptr<ReplaySession>> ReplaySession::Create(
 }
 
 Status ReplaySession::Run(std::stop_token stop) {
-  WaitForReaders(stop);
+  if (Status there = AwaitReaders(
+          clock_, log_, [this] { return readers(); }, 1, stop);
+      !there) {
+    return there;
+  }
   for (std::size_t i = 0; i < trials_.size(); ++i) {
     if (Status status = PlayOne(i, stop); !status) return status;
   }
@@ -90,8 +93,10 @@ Status ReplaySession::PlayOne(std::size_t index, const std::stop_token& stop) {
   const ircp::TrialSamples samples = ircp::SamplesOf(trial, clock_.Now(), options_.frame);
   Status played = streams_.Play(samples, options_.rate, clock_, stop);
   if (dead_man_) dead_man_->Release();
-  if (played &&
-      !streams_.WaitForAcknowledgments(kAcknowledgeTimeout, ircp::RealTimeOf(clock_), stop)) {
+  const auto acknowledged = [this](Duration slice) {
+    return streams_.WaitForAcknowledgments(slice);
+  };
+  if (played && !AwaitAcknowledgments(clock_, acknowledged, stop)) {
     log_.Warning("not every reader has acknowledged the trial", {{"trial", trial.source}});
   }
   control_->SetState("idle", trial.source + " played");
@@ -137,18 +142,6 @@ std::vector<ircp::TopicCount> ReplaySession::sent() const {
   std::vector<ircp::TopicCount> counts = streams_.sent();
   if (dead_man_) counts.push_back(dead_man_->sent());
   return counts;
-}
-
-void ReplaySession::WaitForReaders(const std::stop_token& stop) {
-  const ircp::TimeHold hold(clock_);
-  const Clock& real = ircp::RealTimeOf(clock_);
-  const Duration deadline = real.Steady() + kReaderTimeout;
-  while (!streams_.UnreadTopics().empty() && real.Steady() < deadline) {
-    if (!real.SleepFor(kPollInterval, stop)) return;
-  }
-  for (const std::string& topic : streams_.UnreadTopics()) {
-    log_.Warning("nobody reads", {{"topic", topic}});
-  }
 }
 
 }  // namespace exemplar::capture_suit

@@ -50,7 +50,6 @@ class ReplaySession final : public Session {
  private:
   ReplaySession(const Clock& clock, Log& log, std::vector<demonstration::Trial> trials,
                 TrialStreams streams, const ReplayOptions& options);
-  void WaitForReaders(const std::stop_token& stop);
   /// Presses the dead-man while the suit stands still as the trial begins, until a robot follows.
   Status BeFollowed(const demonstration::Trial& trial, const std::stop_token& stop);
   Status PlayOne(std::size_t index, const std::stop_token& stop);

@@ -1,7 +1,9 @@
 #pragma once
 // What all sessions have in common towards the other programs of the station.
 
+#include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -9,6 +11,8 @@
 #include <vector>
 
 #include "capture_suit/recorder_remote.hpp"
+#include "capture_suit/session.hpp"
+#include "exemplar/base/log.hpp"
 #include "exemplar/geometry/pose.hpp"
 #include "exemplar/ircp/control.hpp"
 
@@ -26,6 +30,27 @@ Result<std::optional<RecorderRemote>> MakeRecorder(bool wanted, ircp::Bus& bus, 
 /// Has the simulator put an object somewhere. Errors say which, and where.
 Status PutObject(ircp::ControlClient& simulator, const std::string& object,
                  const geometry::Pose& base_T_object, const std::stop_token& stop);
+
+/// Waits until each topic of `readers` has `wanted` of them, for a while, in which simulated time
+/// stands; then says what has fewer. kCancelled: `stop` came first.
+Status AwaitReaders(const Clock& clock, Log& log,
+                    const std::function<std::map<std::string, int>()>& readers, int wanted,
+                    const std::stop_token& stop);
+
+/// Until `acknowledged`, which is asked with the time that it may wait, says that every reader has
+/// all of it; false when they took too long, or `stop` came first.
+bool AwaitAcknowledgments(const Clock& clock, const std::function<bool(Duration)>& acknowledged,
+                          const std::stop_token& stop);
+
+/// Postures (rad) from one at rest to another at rest, `rate_hz` of them a second, each sent when
+/// its time has come. kCancelled: `stop` came first.
+Status Glide(const Clock& clock, const Eigen::VectorXd& from, const Eigen::VectorXd& to,
+             double seconds, double rate_hz,
+             const std::function<Status(const Eigen::VectorXd&)>& send,
+             const std::stop_token& stop);
+
+/// That of a session which was stopped.
+Error Cancelled();
 
 /// "(0.46, -0.12)".
 std::string PlaceText(const geometry::Pose& pose);

@@ -6,7 +6,6 @@ namespace exemplar::capture_suit {
 namespace {
 
 constexpr const char* kSource = "replay";
-constexpr Duration kAcknowledgeSlice = std::chrono::milliseconds(100);  // then looks for a stop
 
 /// Calls visit(writer, topic) for each writer that is there.
 template <class Writers, class Visit>
@@ -79,22 +78,10 @@ std::map<std::string, int> TrialStreams::readers() const {
   return readers;
 }
 
-std::vector<std::string> TrialStreams::UnreadTopics() const {
-  std::vector<std::string> topics;
-  ForEachWriter(writers_, [&](const auto& writer, const char* topic) {
-    if (writer.matched_readers() == 0) topics.emplace_back(topic);
-  });
-  return topics;
-}
-
-bool TrialStreams::WaitForAcknowledgments(Duration timeout, const Clock& clock,
-                                          const std::stop_token& stop) {
-  const Duration deadline = clock.Steady() + timeout;
+bool TrialStreams::WaitForAcknowledgments(Duration timeout) {
   bool all = true;
   ForEachWriter(writers_, [&](auto& writer, const char*) {
-    while (all && !writer.WaitForAcknowledgments(kAcknowledgeSlice)) {
-      all = !stop.stop_requested() && clock.Steady() < deadline;
-    }
+    all = all && writer.WaitForAcknowledgments(timeout);
   });
   return all;
 }

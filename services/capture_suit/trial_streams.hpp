@@ -33,11 +33,9 @@ class TrialStreams {
 
   /// How many read each topic.
   std::map<std::string, int> readers() const;
-  /// Topics that nobody reads.
-  std::vector<std::string> UnreadTopics() const;
   std::vector<ircp::TopicCount> sent() const;
-  /// False when some reader has not acknowledged everything within `timeout`, or `stop` came first.
-  bool WaitForAcknowledgments(Duration timeout, const Clock& clock, const std::stop_token& stop);
+  /// Waits for that until `timeout` has passed for one of the topics, and then returns false.
+  bool WaitForAcknowledgments(Duration timeout);
 
  private:
   template <class Sample>

@@ -119,8 +119,8 @@ TEST(ReplaySession, SaysWhenNobodyReads) {
               ElementsAre(Pair("ircp/objects", 0), Pair("ircp/suit", 0), Pair("ircp/tactile", 0)));
   EXPECT_TRUE((*session)->Run({}).ok());
   EXPECT_THAT(log.warnings(),
-              ElementsAre("nobody reads topic=ircp/suit", "nobody reads topic=ircp/tactile",
-                          "nobody reads topic=ircp/objects"));
+              ElementsAre("nobody reads topic=ircp/objects", "nobody reads topic=ircp/suit",
+                          "nobody reads topic=ircp/tactile"));
 }
 
 TEST(ReplaySession, RefusesRatesThatMakeNoSense) {
