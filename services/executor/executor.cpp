@@ -81,7 +81,7 @@ Status Executor::Connect(ircp::Bus& bus) {
   auto plans = bus.MakeWriter<ircp::PlanSample>(kProgram);
   if (!plans.ok()) return plans.error();
   plans_ = *std::move(plans);
-  if (const Status on = ConnectTeleoperation(bus); !on.ok()) return on;
+  if (Status on = ConnectTeleoperation(bus); !on.ok()) return on;
   auto control = ircp::ControlServer::Create(
       bus, clock_, kProgram,
       [this](const ircp::CommandSample& command) { return OnCommand(command); });
@@ -369,7 +369,7 @@ Status Executor::Begin(const api::ExecuteRequest& request) {
     const std::lock_guard lock(mutex_);
     if (closing_) return Unavailable("the executor is shutting down");
   }
-  if (const Status rests = AwaitRest(Event::kPlan); !rests.ok()) return rests;
+  if (Status rests = AwaitRest(Event::kPlan); !rests.ok()) return rests;
   if (const std::optional<std::string> silence = SafetySilence()) return Unavailable(*silence);
   Status begun = Apply(Event::kPlan, "planning \"" + request.skill + "\"");
   if (!begun.ok()) return begun;
