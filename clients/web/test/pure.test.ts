@@ -1,5 +1,6 @@
 import { deepEqual, equal, ok, rejects } from "node:assert/strict";
 import { test } from "node:test";
+import * as THREE from "three";
 import { Client } from "../src/client";
 import { CallError, errorOf, explain } from "../src/errors";
 import { bytes, mm, number, toNumber } from "../src/format";
@@ -8,7 +9,6 @@ import { LineSplitter } from "../src/lines";
 import { base64, objectsOf } from "../src/panels/skill";
 import { judgeTeleoperation } from "../src/panels/teleop";
 import { blend, positionsOf, rowMaxima, thin, tube } from "../src/tube";
-import * as THREE from "three";
 import { cornersOf, frameOf } from "../src/view/frame";
 import type { SkillReport, TeleoperationResult } from "../src/types";
 

@@ -159,7 +159,7 @@ class Watch final : public ClockWatch {
                  {{"program", jump.participant.empty() ? std::string("our own") : jump.program},
                   {"by_s", ToSeconds(jump.by)},
                   {"jumps", jump_count_}});
-    if (!is_first) {
+    if (!is_first && !jump.participant.empty()) {
       log_.Info("a clock jumps again and again",
                 {{"program", jump.program},
                  {"advice", "in simulated time start every program with --clock network"}});
